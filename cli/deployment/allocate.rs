@@ -154,8 +154,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     if let Some(path) = arguments.programs.iter().find(|path| is_plant(path)) {
         return plant::place(arguments, path);
     }
-    let options = options(arguments)?;
+    let mut options = options(arguments)?;
     let programs = Programs::read(&arguments.programs, arguments.period)?;
+    options.networks = programs.networks();
     let (catalogue, about) = catalogue::read(arguments.catalogue.as_deref())?;
     let patience = Patience::new(Some(arguments.budget), console);
     let items = items(arguments, &programs, &patience)?;
@@ -231,6 +232,7 @@ fn options(arguments: &Arguments) -> Result<Options, Answer> {
         share_members: arguments.share_members,
         unverified: arguments.unverified,
         stock: arguments.stock.clone(),
+        networks: 0,
     })
 }
 

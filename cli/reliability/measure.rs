@@ -18,7 +18,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::overrides::OverrideArguments;
-use crate::reliability::prediction::{Times, refused, write_report};
+use crate::reliability::prediction::{MeanTimes, Times, refused, write_report};
 use crate::run::lab::{NetworkArguments, laboratory_settings};
 use crate::run::simulate::seed_of_the_clock;
 
@@ -31,12 +31,16 @@ const LONGEST_LIMIT: Duration = Duration::from_secs(365 * 24 * 3600);
 Example:
   understudy measure examples/press-cell/cluster.toml --mtbf 25h --mttr 30min --failures 200 --seed 1
   understudy measure examples/press-cell/cluster.toml --real --mtbf 3s --mttr 200ms --failures 5
+  understudy measure examples/twin-remote-io/cluster.toml --mtbf 30s --mttr 3s --remote-io 30s,3s --network 60s,3s --failures 60
   understudy measure examples/shared-spare/line-1/cluster.toml --groups 2 --mtbf 10000s --mttr 1000s --cycles-per-mttr 2000 --failures 20
 
 Stations fail and are repaired at random until the system fails. The protocol itself is not accelerated: its time to detect a failure and to
 transfer states is measured and added to the repair time of the model, and the resulting bias is printed. The system fails when a remote
 I/O becomes fail-safe because no station holds the state of its program; in paper mode, at the second failure. Equal arguments and seeds
 give equal simulated campaigns.
+
+With --remote-io and --network, remote I/Os with their twins and networks fail too: the system has failed as well when a program has no remote I/O
+that drives, and when no network is left.
 
 With --groups N, copies of the cluster share as many spares as it has slots (`spare = true`), which wake by their rule
 (docs/how-to/spares.md).
@@ -52,6 +56,12 @@ pub(crate) struct Arguments {
     /// MTTR of a station, from the detection of the failure
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     mttr: String,
+    /// MTBF and MTTR of a remote I/O, which fails and is repaired too; without them remote I/Os do not fail
+    #[arg(long, value_name = "MTBF,MTTR", allow_hyphen_values = true, conflicts_with_all = ["real", "groups", "crews"])]
+    remote_io: Option<String>,
+    /// MTBF and MTTR of a network, which fails and is repaired too; without them networks do not fail
+    #[arg(long, value_name = "MTBF,MTTR", allow_hyphen_values = true, conflicts_with_all = ["real", "groups", "crews"])]
+    network: Option<String>,
     /// Number of repair crews; default: one per station
     #[arg(long, value_name = "R")]
     crews: Option<u32>,
@@ -108,6 +118,12 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let mtbf = times.required("mtbf", Some(&arguments.mtbf));
     let mttr = times.required("mttr", Some(&arguments.mttr));
     let limit = times.required("limit", Some(&arguments.limit));
+    let mut part = |name, text: &Option<String>| {
+        let read = times.parsed::<MeanTimes>(name, text.as_slice()).pop();
+        read.map(|MeanTimes { mtbf, mttr }| (mtbf, mttr))
+    };
+    let remote_io = part("remote-io", &arguments.remote_io);
+    let network = part("network", &arguments.network);
     let (cluster, reports) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
     // Invalid crews and invalid times are reported together.
     let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
@@ -120,6 +136,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let question = Question {
         mtbf,
         mttr,
+        remote_io,
+        network,
         crews: arguments.crews,
         failures: arguments.failures,
         seed: arguments.seed.unwrap_or_else(seed_of_the_clock),

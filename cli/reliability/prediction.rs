@@ -1,5 +1,6 @@
 //! `understudy reliability`: MTTF, reliability and availability from Markov models.
 
+mod cell;
 mod shared;
 
 use std::fs;
@@ -22,6 +23,8 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::run::outcome::command_line;
+use cell::CellArguments;
+pub(crate) use cell::MeanTimes;
 
 /// Calculate the MTTF of a cluster and compare other redundancy
 #[derive(Debug, Args)]
@@ -30,6 +33,7 @@ Example:
   understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --mission 1000h
   understudy reliability examples/press-cell/cluster.toml --mtbf 10000h --mttr 24h --report reliability
   understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --box old*3=4000h,48h --shared power=200000h
+  understudy reliability --controllers 4 --mtbf 10000h --mttr 24h --remote-io 20000h,24h --network 100000h,8h --twins 4 --networks 2
   understudy reliability --chain plant.chain --mission 1y
 
 Units of time: us, ms, s, min, h, d, y. Models and assumptions: docs/reference/reliability.md.")]
@@ -65,6 +69,8 @@ pub(crate) struct Arguments {
     /// Shared part whose failure fails the system, such as power=200000h
     #[arg(long, value_name = "NAME=MTBF")]
     shared: Vec<String>,
+    #[command(flatten)]
+    cell: CellArguments,
     /// Number of repair crews; default: one per station
     #[arg(long, value_name = "R")]
     crews: Option<u32>,
@@ -177,6 +183,7 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
         Some(path) => Some(files::cluster(path, Overrides::default())?),
         None => None,
     };
+    let parts = arguments.cell.read(&mut times);
     let options = |mtbf, mttr| {
         let mut options = match &cluster {
             Some((cluster, _)) => options_of(cluster, mtbf, mttr),
@@ -203,6 +210,7 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
     // Other invalid options and invalid times are reported together.
     let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
     let mut options = options(mtbf.unwrap_or(any), mttr.unwrap_or(any));
+    parts.set(&arguments.cell, &mut options, cluster.as_ref().map(|read| &read.0));
     let mut wrong = set_unequal(&mut options, cluster.as_ref().map(|read| &read.0), boxes);
     wrong.extend(options.system().err().unwrap_or_default());
     times.finish(wrong)?;

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use crate::cell::{CellRow, cells_text, compare_cells};
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
 use crate::options::Options;
@@ -16,7 +17,7 @@ use crate::transient::AfterFailure;
 pub struct Answer {
     /// The options of the calculation.
     pub options: Options,
-    /// Stations of the cluster.
+    /// Stations of the cluster; and its remote I/Os and networks, as far as their times are given.
     pub boxes: u32,
     /// The paper's model with one spare, (20).
     pub mttf_paper_hours: f64,
@@ -30,6 +31,8 @@ pub struct Answer {
     pub mttf_tmr_hours: f64,
     /// Standard deviation of the cluster's time to failure.
     pub deviation_cluster_hours: Option<f64>,
+    /// Whole cells; empty where neither remote I/Os nor networks have times.
+    pub cells: Vec<CellRow>,
     /// Results at the end of the mission.
     #[serde(flatten)]
     pub mission: Option<Mission>,
@@ -132,13 +135,14 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
     let moments = cluster_chain.time_to_failure().ok();
     Ok(Answer {
         options: options.clone(),
-        boxes: system.boxes(),
+        boxes: system.boxes().saturating_add(options.other_boxes()),
         mttf_paper_hours: paper_chain.mttf().map_err(one)?,
         mttf_cluster_hours: cluster_chain.mttf().map_err(one)?,
         mttf_duplex_hours: duplex.mttf().map_err(one)?,
         mttf_simplex_hours: mean(&simplex)?,
         mttf_tmr_hours: tmr.mttf().map_err(one)?,
         deviation_cluster_hours: moments.map(|moments| moments.variance_hours_squared.sqrt()),
+        cells: compare_cells(options)?,
         mission,
     })
 }
@@ -155,12 +159,12 @@ impl Answer {
 
     /// The answer for people.
     pub fn to_text(&self) -> String {
-        let n = self.options.controllers;
+        let (n, other) = (self.options.controllers, self.options.other_boxes());
         let mission = self.mission.as_ref();
         let rows = [
             (
                 "no spare",
-                n,
+                n + other,
                 self.mttf_simplex_hours,
                 mission.map(|at| {
                     (at.reliability_simplex, at.unreliability_simplex, at.density_simplex_per_hour)
@@ -168,7 +172,7 @@ impl Answer {
             ),
             (
                 "paper's model",
-                n + 1,
+                n + 1 + other,
                 self.mttf_paper_hours,
                 mission.map(|at| {
                     (at.reliability_paper, at.unreliability_paper, at.density_paper_per_hour)
@@ -184,7 +188,7 @@ impl Answer {
             ),
             (
                 "full duplex",
-                2 * n,
+                2 * n + other,
                 self.mttf_duplex_hours,
                 mission.map(|at| {
                     (at.reliability_duplex, at.unreliability_duplex, at.density_duplex_per_hour)
@@ -192,7 +196,7 @@ impl Answer {
             ),
             (
                 "TMR",
-                3 * n,
+                3 * n + other,
                 self.mttf_tmr_hours,
                 mission
                     .map(|at| (at.reliability_tmr, at.unreliability_tmr, at.density_tmr_per_hour)),
@@ -226,6 +230,9 @@ impl Answer {
                 probability(at.p1, 9),
                 probability(at.p2, 9)
             );
+        }
+        if !self.cells.is_empty() {
+            let _ = write!(text, "\n{}", cells_text(&self.cells));
         }
         text
     }

@@ -57,15 +57,13 @@ impl FromStr for UnequalBoxes {
 }
 
 /// A shared part on the command line: `NAME=MTBF`.
-impl FromStr for crate::system::SharedPart {
+impl FromStr for crate::parts::SharedPart {
     type Err = ReliabilityError;
 
     fn from_str(text: &str) -> Result<Self, ReliabilityError> {
         let parts = text.split_once('=').map(|(name, time)| (name.trim(), time.trim()));
         match parts {
-            Some((name, mtbf)) if !name.is_empty() => {
-                Ok(Self { name: name.to_owned(), mtbf: mtbf.parse()? })
-            }
+            Some((name, mtbf)) if !name.is_empty() => Ok(Self::single(name, mtbf.parse()?)),
             _ => Err(ReliabilityError::BoxText {
                 text: text.to_owned(),
                 why: "expected NAME=MTBF".to_owned(),

@@ -4,6 +4,9 @@
 //! (14) to (20). A chain gives mean times by elimination and transients by uniformisation. Invariant: probabilities and times are
 //! sums of terms that are not negative, so no result loses its digits, whatever the rates are.
 //!
+//! What everything depends on is in series with the stations: remote I/Os with or without twins, networks, power (`parts.rs`). [`compare_cells`]
+//! compares whole cells.
+//!
 //! Measured: estimates with exact intervals, a test of fit against the law that the model implies, and simulation of what is too rare to
 //! wait for. Randomness is an argument.
 //!
@@ -12,6 +15,7 @@
 mod answer;
 mod boxes;
 mod campaign;
+mod cell;
 mod chain;
 mod chain_answer;
 mod copies;
@@ -25,6 +29,7 @@ mod format;
 mod graph;
 mod measured;
 mod options;
+mod parts;
 mod poisson_weights;
 mod quantity;
 mod report;
@@ -36,6 +41,7 @@ mod transient;
 pub use answer::{Answer, Mission, calculate};
 pub use boxes::{UNDERSTUDIES, UnequalBoxes};
 pub use campaign::{Assessment, Campaign, SystemFailure, assess};
+pub use cell::{CellRow, cells_text, compare_cells};
 pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};
 pub use chain_answer::{ByState, ChainAnswer, ChainMission, StateAnswer, answer_chain};
 pub use copies::Survival;
@@ -48,6 +54,7 @@ pub use measured::{
     Stopped, acceleration_bias, fit, mean_time, outlook, proportion, rare_event, times_to_failure,
 };
 pub use options::Options;
+pub use parts::{Networks, Pair, REMOTE_IO_PAIR, RemoteIos, SharedPart};
 pub use quantity::{
     Hours, MAXIMUM_HOURS, MINIMUM_HOURS, MINIMUM_PROBABILITY, Probability, grouped,
 };
@@ -57,8 +64,7 @@ pub use sensitivity::{
 };
 pub use shared_spares::{MAXIMUM_SHARED_GROUPS, MAXIMUM_SHARED_SPARES, SharedSpares};
 pub use system::{
-    BoxKind, CommonCause, CommonCauseConvention, MAXIMUM_BOXES, MAXIMUM_MODEL_STATES, Rule,
-    SharedPart, System,
+    BoxKind, CommonCause, CommonCauseConvention, MAXIMUM_BOXES, MAXIMUM_MODEL_STATES, Rule, System,
 };
 pub use transient::{AfterFailure, Transient};
 

@@ -3,9 +3,11 @@
 use serde::Serialize;
 
 use crate::boxes::UnequalBoxes;
+use crate::chain::Chain;
 use crate::error::ReliabilityError;
+use crate::parts::{Networks, RemoteIos, SharedPart, chain_of};
 use crate::quantity::{Hours, Probability};
-use crate::system::{BoxKind, CommonCause, CommonCauseConvention, Rule, SharedPart, System};
+use crate::system::{BoxKind, CommonCause, CommonCauseConvention, Rule, System};
 
 /// Options of `understudy reliability`, as they are given; [`Options::system`] checks them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -36,6 +38,10 @@ pub struct Options {
     pub convention: CommonCauseConvention,
     /// Parts that everything depends on.
     pub shared: Vec<SharedPart>,
+    /// Remote I/Os with their twins; nothing: they do not fail.
+    pub remote_ios: Option<RemoteIos>,
+    /// Networks; nothing: they do not fail.
+    pub networks: Option<Networks>,
     /// Mission time.
     pub mission: Option<Hours>,
 }
@@ -57,6 +63,8 @@ impl Options {
             beta: 0.0,
             convention: CommonCauseConvention::Additive,
             shared: Vec::new(),
+            remote_ios: None,
+            networks: None,
             mission: None,
         }
     }
@@ -92,6 +100,7 @@ impl Options {
         let of_understudies = self.unequal.iter().find(|boxes| boxes.understudies);
         let (mtbf, mttr) =
             of_understudies.map_or((self.mtbf, self.mttr), |boxes| (boxes.mtbf, boxes.mttr));
+        let shared = self.parts(&mut errors);
         let system = System {
             controllers,
             understudies: kind("understudies", self.spares, mtbf, mttr),
@@ -104,12 +113,41 @@ impl Options {
                 .ok()
                 .filter(|beta| beta.get() > 0.0)
                 .map(|beta| CommonCause { beta, convention: self.convention }),
-            shared: self.shared.clone(),
+            shared,
         };
         if let Err(found) = system.check() {
             errors.extend(found);
         }
         if errors.is_empty() { Ok(system) } else { Err(errors) }
+    }
+}
+
+impl Options {
+    /// All parts in series with the stations. Errors are added to `errors`.
+    fn parts(&self, errors: &mut Vec<ReliabilityError>) -> Vec<SharedPart> {
+        let mut parts = self.shared.clone();
+        parts.extend(self.remote_ios.iter().flat_map(|them| them.parts(errors)));
+        parts.extend(self.networks.iter().map(|them| them.part(self.groups, errors)));
+        parts
+    }
+
+    /// Chain of the parts in series with the stations, as if stations did not fail; nothing where there are none.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the parts.
+    pub fn parts_chain(&self) -> Result<Option<Chain>, Vec<ReliabilityError>> {
+        let mut errors = Vec::new();
+        let parts = self.parts(&mut errors);
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        if parts.is_empty() { Ok(None) } else { chain_of(&parts).map(Some) }
+    }
+
+    /// Machines that are no stations: remote I/Os with their twins, and one switch for each network, as far as their times are given.
+    pub fn other_boxes(&self) -> u32 {
+        let networks = self.networks.map_or(0, |them| them.count.saturating_mul(self.groups));
+        self.remote_ios.map_or(0, |them| them.boxes()).saturating_add(networks)
     }
 }
 

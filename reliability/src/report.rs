@@ -205,8 +205,26 @@ fn assumptions(options: &Options) -> Vec<String> {
     } else {
         said.push("No common cause affects several stations.".into());
     }
+    match options.remote_ios {
+        None => said.push("Remote I/Os do not fail.".into()),
+        Some(them) => said.push(format!(
+            "{} of {} remote I/Os have a twin; a remote I/O fails after {} on average and is repaired in {}. A twin takes over with probability {}; \
+             the share β = {} of its failures affects both, in addition.",
+            them.twins, them.count, them.mtbf, them.mttr, them.switchover, them.beta
+        )),
+    }
+    match options.networks {
+        None => said.push("Networks do not fail.".into()),
+        Some(them) if them.count > 1 => said.push(format!(
+            "A network fails after {} on average and is repaired in {}; there are two, and the share β = {} of failures affects both, in addition.",
+            them.mtbf, them.mttr, them.beta
+        )),
+        Some(them) => {
+            said.push(format!("The first failure of the network fails the system; its MTBF is {}.", them.mtbf));
+        }
+    }
     if options.shared.is_empty() {
-        said.push("Network, power and remote I/Os do not fail.".into());
+        said.push("No other part is shared.".into());
     }
     for part in &options.shared {
         said.push(format!(

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::error::ReliabilityError;
+use crate::parts::Pair;
 use crate::quantity::{Hours, Probability, stated};
 use crate::system::System;
 
@@ -46,7 +47,10 @@ pub struct ByUnderstudies {
 }
 
 /// A change of a system by a factor.
-type Change = Box<dyn Fn(&mut System, f64) -> Result<(), ReliabilityError>>;
+type Change = Box<dyn Fn(&mut System, f64) -> Changed>;
+
+/// Whether a change was possible.
+type Changed = Result<(), ReliabilityError>;
 
 fn mean(system: &System) -> Result<f64, Vec<ReliabilityError>> {
     system.chain()?.mttf().map_err(|error| vec![error])
@@ -127,6 +131,37 @@ fn parameters(system: &System) -> Vec<(String, String, Change)> {
                 Ok(())
             }),
         ));
+        let Some(pair) = part.pair else {
+            continue;
+        };
+        let mut of_pair = |name: &str, value: String, change: fn(&mut Pair, f64) -> Changed| {
+            parameters.push((
+                format!("{name} of {}", part.name),
+                value,
+                Box::new(move |system, factor| {
+                    let pair = system.shared[index].pair.as_mut();
+                    pair.map_or(Ok(()), |pair| change(pair, factor))
+                }),
+            ));
+        };
+        of_pair("MTTR", pair.mttr.to_string(), |pair, factor| {
+            pair.mttr = scaled(pair.mttr, factor)?;
+            Ok(())
+        });
+        let uncovered = 1.0 - pair.switchover.get();
+        if uncovered > 0.0 {
+            of_pair("share of failed switchovers", format!("{uncovered:.3e}"), |pair, factor| {
+                let share = ((1.0 - pair.switchover.get()) * factor).min(1.0);
+                pair.switchover = Probability::new("the coverage of the switchover", 1.0 - share)?;
+                Ok(())
+            });
+        }
+        if pair.beta.get() > 0.0 {
+            of_pair("share β", pair.beta.get().to_string(), |pair, factor| {
+                pair.beta = Probability::new("beta", (pair.beta.get() * factor).min(1.0))?;
+                Ok(())
+            });
+        }
     }
     parameters
 }

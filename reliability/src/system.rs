@@ -8,7 +8,7 @@
 //!   controller, so while one lives all outputs can be restored.
 //!
 //! A failed box is repaired after it was detected; it is masked from the first cycle on, so detection costs time to repair and nothing
-//! else. The system fails with its first group, with a failure that is not covered, with a common cause, or with a shared part.
+//! else. The system fails with its first group, with a failure that is not covered, with a common cause, or with a shared part (`parts.rs`).
 
 use std::collections::HashMap;
 
@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use crate::chain::{Chain, explore};
 use crate::error::ReliabilityError;
+use crate::parts::{Lacking, Positions, SharedPart, detected, steps};
 use crate::quantity::{Hours, Probability};
 
 /// Maximum number of stations of one system.
@@ -67,15 +68,6 @@ pub struct CommonCause {
     pub convention: CommonCauseConvention,
 }
 
-/// A part that everything depends on, such as the network or the power supply: its first failure is the system's.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SharedPart {
-    /// Name of the part.
-    pub name: String,
-    /// Mean time between its failures.
-    pub mtbf: Hours,
-}
-
 /// The description of a system, from which its model is made.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct System {
@@ -96,7 +88,7 @@ pub struct System {
     pub detection: Option<Hours>,
     /// Common-cause failures.
     pub common_cause: Option<CommonCause>,
-    /// Parts that everything depends on.
+    /// Parts in series with the stations.
     pub shared: Vec<SharedPart>,
 }
 
@@ -112,7 +104,10 @@ struct Kind {
 type GroupState = Vec<(u32, u32)>;
 
 /// How many groups are in which state, by number of the state.
-type SystemState = Vec<(u32, u32)>;
+type GroupsState = Vec<(u32, u32)>;
+
+/// The groups, and the pairs of shared parts that lack one.
+type SystemState = (GroupsState, Lacking);
 
 impl System {
     /// Controllers in all.
@@ -152,6 +147,9 @@ impl System {
         if self.controllers.is_empty() {
             count("the number of controllers", 0, 1, MAXIMUM_BOXES);
         }
+        for part in &self.shared {
+            count(&format!("the number of {}", part.name), part.count, 1, MAXIMUM_BOXES);
+        }
         if let Some(crews) = self.crews {
             count("the number of repair crews", crews, 1, MAXIMUM_BOXES);
         }
@@ -175,13 +173,14 @@ impl System {
         let mut groups =
             Groups { kinds: self.kinds(), numbers: HashMap::new(), states: Vec::new() };
         let whole = groups.number(vec![(0, 0); groups.kinds.len()]);
-        let first: SystemState = vec![(whole, self.groups)];
+        let pairs: Vec<Positions> = self.pairs().collect();
+        let first: SystemState = (vec![(whole, self.groups)], vec![(0, 0); pairs.len()]);
         let names = std::cell::RefCell::new(groups);
         let (chain, _) = explore(
             first,
             MAXIMUM_MODEL_STATES,
             |state| names.borrow().name(state, self),
-            |state, found| self.successors(&mut names.borrow_mut(), state, found),
+            |state, found| self.successors(&mut names.borrow_mut(), &pairs, state, found),
         )?;
         Ok(chain)
     }
@@ -216,13 +215,31 @@ impl System {
 
     /// Rate of what fails the system from every state.
     fn lethal_rate(&self) -> f64 {
-        let shared: f64 = self.shared.iter().map(|part| part.mtbf.rate()).sum();
         let kinds = self
             .controllers
             .iter()
             .chain((self.understudies.count > 0).then_some(&self.understudies));
         let fastest = kinds.map(|kind| kind.mtbf.rate()).fold(0.0, f64::max);
-        shared + self.common_cause.map_or(0.0, |cause| cause.beta.get() * fastest)
+        self.lethal_rate_of_parts()
+            + self.common_cause.map_or(0.0, |cause| cause.beta.get() * fastest)
+    }
+
+    /// Rate at which shared parts fail the system from every state.
+    pub(crate) fn lethal_rate_of_parts(&self) -> f64 {
+        self.shared.iter().map(SharedPart::lethal_rate).sum()
+    }
+
+    /// Shared parts of which one of two may be down.
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = Positions> + '_ {
+        self.shared.iter().filter_map(SharedPart::positions)
+    }
+
+    /// Share of `detected` failed boxes that a crew works on: each is as likely to be worked on as any other.
+    pub(crate) fn attended(&self, detected: u32) -> f64 {
+        match self.crews {
+            Some(crews) if crews < detected => f64::from(crews) / f64::from(detected),
+            _ => 1.0,
+        }
     }
 
     fn group_fails(&self, kinds: &[Kind], state: &GroupState) -> bool {
@@ -239,6 +256,7 @@ impl System {
     fn successors(
         &self,
         groups: &mut Groups,
+        pairs: &[Positions],
         state: &SystemState,
         found: &mut Vec<(Option<SystemState>, f64)>,
     ) {
@@ -246,19 +264,23 @@ impl System {
         if lethal > 0.0 {
             found.push((None, lethal));
         }
-        let detected: u32 = state
+        let (of_groups, lacking) = state;
+        let stations: u32 = of_groups
             .iter()
             .map(|&(number, count)| {
                 let group = &groups.states[number as usize];
                 count * group.iter().map(|(_, detected)| detected).sum::<u32>()
             })
             .sum();
-        // Each box that is down is as likely to be worked on as any other.
-        let attended = match self.crews {
-            Some(crews) if crews < detected => f64::from(crews) / f64::from(detected),
-            _ => 1.0,
-        };
-        for &(number, count) in state {
+        let attended = self.attended(stations + detected(lacking));
+        let mut of_pairs = Vec::new();
+        steps(pairs, lacking, attended, None, &mut of_pairs);
+        found.extend(
+            of_pairs
+                .into_iter()
+                .map(|(to, rate)| (to.map(|lacking| (of_groups.clone(), lacking)), rate)),
+        );
+        for &(number, count) in of_groups {
             let group = groups.states[number as usize].clone();
             for index in 0..groups.kinds.len() {
                 let kind = &groups.kinds[index];
@@ -320,7 +342,7 @@ impl Groups {
     /// The system after one group has gone from state `from` to `to`.
     fn moved(&mut self, system: &SystemState, from: u32, to: GroupState) -> SystemState {
         let to = self.number(to);
-        let mut after = system.clone();
+        let (mut after, lacking) = system.clone();
         if let Ok(place) = after.binary_search_by_key(&from, |&(number, _)| number) {
             after[place].1 -= 1;
             if after[place].1 == 0 {
@@ -331,11 +353,11 @@ impl Groups {
             Ok(place) => after[place].1 += 1,
             Err(place) => after.insert(place, (to, 1)),
         }
-        after
+        (after, lacking)
     }
 
     /// What is down, such as `2 controllers, 1 understudy`.
-    fn name(&self, state: &SystemState, system: &System) -> String {
+    fn name(&self, (state, lacking): &SystemState, system: &System) -> String {
         if self.kinds.len() > 3 || state.len() > 3 {
             return String::new();
         }
@@ -368,6 +390,10 @@ impl Groups {
             } else if !down.is_empty() {
                 parts.push(down.join(", "));
             }
+        }
+        let pairs = system.shared.iter().filter(|part| part.pair.is_some());
+        for (pair, (_, down)) in pairs.zip(lacking).filter(|(_, (_, down))| *down > 0) {
+            parts.push(format!("{down} × half of a {}", pair.name));
         }
         if parts.is_empty() { "all work".into() } else { parts.join("; ") }
     }

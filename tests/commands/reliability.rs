@@ -88,6 +88,63 @@ fn shared_spares_are_compared_with_pairs() {
     assert!(refused.status == 2 && refused.errors.contains(wanted), "{}", refused.errors);
 }
 
+/// The tables of the page about whole cells are what its commands print.
+#[test]
+fn the_tables_of_a_whole_cell_are_those_of_the_page() {
+    let page = include_str!("../../docs/how-to/no-single-point.md");
+    for command in ["understudy allocate ", "understudy reliability "] {
+        let (_, after) = page.split_once(&format!("```sh\n{command}")).expect(command);
+        let (arguments, after) = after.split_once('\n').expect("a line");
+        let (_, table) = after.split_once("```text\n").expect("a table");
+        let (table, _) = table.split_once("```").expect("its end");
+        let name = command.split_whitespace().nth(1).expect("a command");
+        let arguments: Vec<&str> = [name].into_iter().chain(arguments.split(' ')).collect();
+        let found = understudy(&arguments);
+        assert_eq!(found.status, 0, "{}", found.errors);
+        assert!(table.lines().count() > 3, "{table}");
+        for line in table.lines() {
+            assert!(found.output.lines().any(|it| it == line), "{line}\n{}", found.output);
+        }
+    }
+}
+
+/// A cluster file says how many remote I/Os, twins and networks there are.
+#[test]
+fn a_whole_cell_has_its_remote_ios_twins_and_networks() {
+    let times = ["--remote-io", "20000h,24h", "--network", "100000h,8h"];
+    let cell = "examples/twin-remote-io/cluster.toml";
+    let of_file = reliability(&[&[cell, "--json"], &RATES[..], &times[..]].concat()).json();
+    let counts = ["--controllers", "2", "--twins", "2", "--networks", "2", "--json"];
+    let by_hand = reliability(&[&counts[..], &RATES[..], &times[..]].concat()).json();
+    assert_eq!(of_file["result"], by_hand["result"]);
+    assert_eq!(of_file["boxes"], Value::from(9), "3 stations, 4 remote I/Os, 2 networks");
+    let single = reliability(&[&[PRESS_CELL, "--json"], &RATES[..], &times[..]].concat()).json();
+    assert_eq!(single["boxes"], Value::from(6), "3 stations, 2 remote I/Os, a network");
+    let mean = |found: &Value| found["result"]["mttf_cluster_hours"].as_f64().expect("a mean");
+    assert!(mean(&of_file) > 80.0 * mean(&single));
+    // Spares: the same parts in series with all rows.
+    let plant = ["--controllers", "300", "--groups", "25", "--shared-spares", "1", "--json"];
+    let parts = ["--twins", "300", "--networks", "2"];
+    let found = reliability(&[&plant[..], &RATES[..], &times[..], &parts[..]].concat()).json();
+    let row = |place: usize| found["result"]["compared"][place].clone();
+    assert_eq!(row(0)["boxes"], Value::from(600 + 600 + 50));
+    assert_eq!(row(2)["boxes"], Value::from(300 + 25 + 1 + 600 + 50));
+    // 300 pairs of remote I/Os and 25 of networks in closed form.
+    let pair = |l: f64, m: f64| 2.0 * l * l / (3.0 * l + m);
+    let parts = 300.0 * pair(1.0 / 20_000.0, 1.0 / 24.0) + 25.0 * pair(1e-5, 1.0 / 8.0);
+    let wanted = 1.0 / (1.0 / 24_166.0 + parts);
+    let hours = row(2)["mttf_hours"].as_f64().expect("a mean");
+    assert!((hours / wanted - 1.0).abs() < 5e-3, "{hours}, {wanted}");
+    let wrong = ["--controllers", "2", "--twins", "3", "--remote-io", "1h", "--network", "1h,0h"];
+    let refused = reliability(&[&wrong[..], &RATES[..]].concat());
+    assert_eq!(refused.status, 2);
+    assert!(
+        refused.errors.contains("--remote-io") && refused.errors.contains("--network"),
+        "{}",
+        refused.errors
+    );
+}
+
 #[test]
 fn a_cluster_file_says_how_many_boxes_there_are() {
     let of_file = reliability(&[&[PRESS_CELL, "--json"], &RATES[..]].concat()).json();

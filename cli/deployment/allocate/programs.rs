@@ -102,6 +102,14 @@ impl Programs {
         Ok(Self { groups, reports })
     }
 
+    /// Networks of all groups together.
+    pub(crate) fn networks(&self) -> usize {
+        let has_two = |group: &Group| {
+            group.cluster.as_ref().is_some_and(|cluster| cluster.has_two_networks())
+        };
+        self.groups.iter().map(|group| 1 + usize::from(has_two(group))).sum()
+    }
+
     /// Title of all programs.
     pub(crate) fn title(&self) -> String {
         let names = self.groups.iter().map(|group| match &group.cluster {

@@ -67,11 +67,16 @@ pub(super) fn members(
             Some(cluster) => group.name(&cluster.remote_ios()[place].name),
             None => format!("{name}-io"),
         };
+        let twin = group.cluster.as_ref().and_then(|cluster| {
+            let twin = cluster.remote_ios()[place].twin.as_ref()?;
+            Some(group.name(&twin.name))
+        });
         Ok(Member {
             program: Resources::of(&member.ladder),
             verification: verification(&subject, properties, patience)?,
             name,
             remote_io,
+            twin,
         })
     });
     members.collect()

@@ -19,6 +19,18 @@ struct Row {
     mttf_hours: f64,
 }
 
+/// Mean time to failure of stations that fail after `stations_hours`, in series with remote I/Os and networks. All of them fail rarely compared with their
+/// repair, so the times to failure are exponential.
+fn in_series(stations_hours: f64, options: &Options) -> Result<f64, Vec<ReliabilityError>> {
+    match options.parts_chain()? {
+        None => Ok(stations_hours),
+        Some(parts) => {
+            let parts_hours = parts.mttf().map_err(|error| vec![error])?;
+            Ok(1.0 / (1.0 / stations_hours + 1.0 / parts_hours))
+        }
+    }
+}
+
 /// The pairs, and 0 to `most` shared spares.
 pub(super) fn compared(
     arguments: &Arguments,
@@ -39,12 +51,14 @@ pub(super) fn compared(
         return Err(refused(&[wrong]));
     }
     let (wake, coverage): (Option<Hours>, _) = (wake, coverage.unwrap_or(Probability::ONE));
-    let pairs = options.system().and_then(|system| system.copies_chain(2));
-    let pairs = pairs.map_err(|errors| refused(&errors))?;
+    let stations = Options { remote_ios: None, networks: None, ..options.clone() };
+    let pairs = stations.system().and_then(|system| system.copies_chain(2));
+    let pairs = pairs.and_then(|chain| chain.mttf().map_err(|error| vec![error]));
+    let pairs = pairs.and_then(|hours| in_series(hours, options));
     let mut rows = vec![Row {
         name: "hot-standby pairs".to_owned(),
-        boxes: 2 * options.controllers,
-        mttf_hours: pairs.mttf().map_err(|error| refused(&[error]))?,
+        boxes: 2 * options.controllers + options.other_boxes(),
+        mttf_hours: pairs.map_err(|errors| refused(&errors))?,
     }];
     // From the largest number down, so that one out of its bounds is refused at once.
     for (spares, wake) in (0..=most).rev().zip(std::iter::repeat(wake).flatten()) {
@@ -62,8 +76,11 @@ pub(super) fn compared(
             1,
             Row {
                 name: format!("{spares} shared spare{}", if spares == 1 { "" } else { "s" }),
-                boxes: options.controllers + options.groups + spares,
-                mttf_hours: plant.mttf().map_err(|errors| refused(&errors))?,
+                boxes: options.controllers + options.groups + spares + options.other_boxes(),
+                mttf_hours: plant
+                    .mttf()
+                    .and_then(|hours| in_series(hours, options))
+                    .map_err(|errors| refused(&errors))?,
             },
         );
     }

@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::bill::{BillRow, bill};
 use crate::controller::{Catalogue, Controller};
 use crate::fit::{Dimension, Fit, Verdict};
 use crate::modules::Modules;
@@ -62,6 +63,8 @@ pub struct Item {
     pub need: Need,
     /// Verification result of its program.
     pub verification: Verification,
+    /// The remote I/O whose twin it is.
+    pub twin_of: Option<String>,
 }
 
 /// Rules of the choice.
@@ -77,6 +80,8 @@ pub struct Options {
     pub unverified: bool,
     /// Available controllers; empty: every model of the catalogue.
     pub stock: Vec<Stock>,
+    /// Networks of all groups together, each with a switch.
+    pub networks: usize,
 }
 
 /// Assessment of a controller for one position.
@@ -112,6 +117,8 @@ pub struct Placed {
     pub verification: Verification,
     /// The best first; none where its program has not passed verification.
     pub candidates: Vec<Candidate>,
+    /// The remote I/O whose twin it is.
+    pub twin_of: Option<String>,
     /// Why it is on no box.
     pub left_over: Option<String>,
 }
@@ -155,6 +162,8 @@ pub struct Allocation {
     pub items: Vec<Placed>,
     /// Selected controllers.
     pub boxes: Vec<BoxOnPlan>,
+    /// All boxes of the cell with their price, next to other ways to build it; empty for programs whose terminals are on their own controllers.
+    pub bill: Vec<BillRow>,
     /// Whether no better packing exists by what is preferred.
     pub best: bool,
     /// Notes on the plan.
@@ -265,7 +274,7 @@ pub fn allocate(
             taken: taken(loads),
         }
     });
-    let boxes = boxes.collect();
+    let boxes: Vec<BoxOnPlan> = boxes.collect();
     let placed = items.iter().zip(&fits).enumerate();
     let placed = placed.map(|(place, (item, of_item))| {
         let candidates = order.rank(&offers, of_item);
@@ -277,17 +286,20 @@ pub fn allocate(
             inputs: item.need.inputs,
             outputs: item.need.outputs,
             verification: item.verification.clone(),
+            twin_of: item.twin_of.clone(),
             left_over: left_over.then(|| why(item, &candidates, may_be_placed(item))),
             candidates,
         }
     });
-    let placed = placed.collect();
+    let placed: Vec<Placed> = placed.collect();
     // Modules are chosen for one item at a time, and items that share a controller may need fewer.
     let may_share =
         |left: usize, right: usize| !apart(&items[left], &items[right], options.share_members);
     let shared = (0..items.len()).any(|one| (0..one).any(|other| may_share(one, other)));
     let extended = offers.len() > types.len();
-    Ok(Allocation { items: placed, boxes, best: packing.best && !(shared && extended), remarks })
+    let bill = bill(&placed, &boxes, options.networks);
+    let best = packing.best && !(shared && extended);
+    Ok(Allocation { items: placed, boxes, bill, best, remarks })
 }
 
 /// Whether one failure must not take both.

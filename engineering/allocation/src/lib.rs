@@ -11,6 +11,7 @@
 
 mod additions;
 mod allocate;
+mod bill;
 mod controller;
 mod csv;
 mod domains;
@@ -34,6 +35,7 @@ pub use allocate::{
     Allocation, AllocationError, BoxOnPlan, Candidate, Item, Options, Placed, Preference, Stock,
     Verification, allocate,
 };
+pub use bill::{BillRow, Price};
 pub use controller::{Catalogue, Controller, Family, Kind};
 pub use domains::{Conflict, Distribution, Domain, Machine, PlantRole, Shortage, distribute};
 pub use figures::{FamilyQuantity, Figure, Quantity, Statement};

@@ -1,6 +1,6 @@
 //! Controller positions required by the programs of a plant.
 //!
-//! Where remote I/Os have the terminals, a group of programs wants a controller for each, its understudies, and a remote I/O for each;
+//! Where remote I/Os have the terminals, a group of programs wants a controller for each, its understudies, a remote I/O for each, and its twin;
 //! all of them speak over a network, and scan once a period. A program that stands alone wants one controller with its terminals.
 
 use std::time::Duration;
@@ -21,6 +21,8 @@ pub struct Member {
     pub verification: Verification,
     /// The name of the remote I/O with its terminals.
     pub remote_io: String,
+    /// The name of the twin of this remote I/O.
+    pub twin: Option<String>,
 }
 
 /// Programs with one generated understudy.
@@ -56,6 +58,7 @@ impl Group {
             group: Some(number),
             need: station(Role::Controller, member.program),
             verification: member.verification.clone(),
+            twin_of: None,
         });
         let verification = self.verification();
         let understudies = self.understudies.iter().map(|name| Item {
@@ -63,9 +66,10 @@ impl Group {
             group: Some(number),
             need: station(Role::Understudy, self.understudy),
             verification: verification.clone(),
+            twin_of: None,
         });
-        let remote_ios = self.members.iter().map(|member| Item {
-            name: member.remote_io.clone(),
+        let remote_io = |member: &Member, name: &str, twin_of: Option<String>| Item {
+            name: name.to_owned(),
             group: Some(number),
             need: Need {
                 role: Role::RemoteIo,
@@ -78,6 +82,13 @@ impl Group {
                 ethernet: true,
             },
             verification: member.verification.clone(),
+            twin_of,
+        };
+        let remote_ios = self.members.iter().flat_map(|member| {
+            let first = remote_io(member, &member.remote_io, None);
+            let twin = member.twin.as_ref();
+            let twin = twin.map(|name| remote_io(member, name, Some(member.remote_io.clone())));
+            [first].into_iter().chain(twin)
         });
         controllers.chain(understudies).chain(remote_ios).collect()
     }
@@ -111,5 +122,6 @@ pub fn alone(member: &Member) -> Item {
             ethernet: false,
         },
         verification: member.verification.clone(),
+        twin_of: None,
     }
 }

@@ -9,7 +9,9 @@ use minijinja::{Environment, Value, context};
 use serde::Serialize;
 
 use crate::allocate::{Allocation, BoxOnPlan, Candidate, Placed};
+use crate::bill::bill_text;
 use crate::csv::line;
+use crate::figures::Quantity;
 use crate::fit::{Dimension, Verdict};
 use crate::modules::{with_modules, words};
 use crate::need::Terms;
@@ -54,6 +56,7 @@ pub fn html(
     environment.add_filter("percent", percent);
     environment.add_filter("words", |name: String| name.replace('_', " "));
     environment.add_filter("links", links);
+    environment.add_filter("price", |hundredths: u64| Quantity::Price.text(hundredths));
     let numbered = sources(allocation);
     let numbers: BTreeMap<String, usize> = numbered.iter().cloned().zip(1..).collect();
     environment.add_filter("cite", move |source: String| {
@@ -206,6 +209,7 @@ pub fn text(allocation: &Allocation, all: bool) -> String {
             let _ = writeln!(text, "no box for {}: {why}", item.name);
         }
     }
+    text.push_str(&bill_text(&allocation.bill));
     if !allocation.best {
         text.push_str("a better placement may exist: not every combination was compared\n");
     }
@@ -216,7 +220,8 @@ pub fn text(allocation: &Allocation, all: bool) -> String {
 }
 
 fn push_item(text: &mut String, item: &Placed, shown: usize) {
-    let _ = write!(text, "{} ({})", item.name, item.role);
+    let twin = item.twin_of.as_ref().map_or(String::new(), |of| format!(", twin of {of}"));
+    let _ = write!(text, "{} ({}{twin})", item.name, item.role);
     if let Some(program) = &item.program {
         let _ = write!(
             text,

@@ -13,6 +13,7 @@ mod scan;
 mod simulate;
 mod spares;
 mod timing;
+mod twins;
 
 use std::process::ExitCode;
 
@@ -38,6 +39,7 @@ Example:
   understudy-bench log --cycles 2000
   understudy-bench timing --controllers 4,16 --period 10ms --seconds 10
   understudy-bench spares --rounds 200
+  understudy-bench twins --count 500
 
 Exit status: 0 if the targets are met, 1 if not, 2 for invalid input."
 )]
@@ -61,6 +63,7 @@ enum Benchmark {
     Scan(scan::Arguments),
     Timing(timing::Arguments),
     Spares(Box<spares::Arguments>),
+    Twins(Box<twins::Arguments>),
     #[command(hide = true)]
     Member(exchange::MemberArguments),
     #[command(hide = true)]
@@ -89,6 +92,7 @@ impl Benchmark {
             Self::Timing(arguments) => ("timing", timing::run(arguments, console).into()),
             Self::Timed(arguments) => ("timed", timing::run_timed(arguments)),
             Self::Spares(arguments) => ("spares", spares::run(arguments, console).into()),
+            Self::Twins(arguments) => ("twins", twins::run(arguments, console).into()),
             Self::Member(arguments) => ("member", exchange::run_member(arguments)),
             Self::Node(arguments) => ("node", run_station(arguments).into()),
             Self::RemoteIo(arguments) => ("remote-io", run_remote_io(arguments).into()),

@@ -23,6 +23,8 @@ fn a_thousand_failures_of_the_press_cell(bencher: divan::Bencher<'_, '_>) {
         seed: 1,
         maximum_cycles: u64::MAX,
         threads: 2,
+        remote_io: None,
+        network: None,
     };
     bencher
         .counter(divan::counter::ItemsCount::new(FAILURES))

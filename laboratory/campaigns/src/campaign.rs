@@ -8,6 +8,7 @@
 
 mod found;
 mod lives;
+mod parts;
 mod question;
 mod real;
 mod replica;
@@ -24,6 +25,7 @@ use understudy_reliability::{Campaign, SystemFailure};
 use understudy_simulator::NotReady;
 
 pub use found::{Found, hold_against_model};
+pub use parts::{PartTimes, PartsFound};
 pub use question::{
     Planned, Question, QuestionError, Speed, options_of, plan_campaign, set_unequal,
 };
@@ -55,6 +57,10 @@ pub struct CampaignPlan {
     pub maximum_cycles: u64,
     /// Processors that are used.
     pub threads: usize,
+    /// Times of a remote I/O; nothing: they do not fail.
+    pub remote_io: Option<PartTimes>,
+    /// Times of a network; nothing: they do not fail.
+    pub network: Option<PartTimes>,
 }
 
 /// What a campaign found, beside what the model is asked about.
@@ -68,6 +74,8 @@ pub struct Measured {
     pub own: OwnTime,
     /// Failures of stations after which a deadline had nothing true to apply, although the redundancy that was left should have masked them.
     pub unmasked: u64,
+    /// Remote I/Os and networks.
+    pub parts: PartsFound,
     /// What must never happen and did, in words.
     pub violations: Vec<String>,
     /// What a reader has to know of the run besides.
@@ -108,7 +116,13 @@ pub fn run_campaign(
     watch: &mut dyn FnMut(u64),
 ) -> Result<Measured, CampaignError> {
     let runs = replicas(plan, watch, &|number| simulated(cluster, plan, number))?;
-    Ok(gathered(cluster, plan, "simulator", runs.into_iter()))
+    let mut parts = PartsFound::default();
+    let runs = runs.into_iter().map(|(run, found)| {
+        parts.add(&found);
+        run
+    });
+    let measured = gathered(cluster, plan, "simulator", runs);
+    Ok(Measured { parts, ..measured })
 }
 
 /// All replicas of a plan, in the order of their numbers.
@@ -207,6 +221,7 @@ fn gathered(
         campaign,
         cycles: (total_ns as f64 / period_ns) as u64,
         own,
+        parts: PartsFound::default(),
         violations,
         remarks: Vec::new(),
     }

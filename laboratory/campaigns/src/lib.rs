@@ -9,9 +9,9 @@ mod observed;
 mod outlook;
 
 pub use campaign::{
-    CampaignError, CampaignPlan, Found, Measured, OwnTime, Planned, Question, QuestionError,
-    RealCampaign, RealCampaignRun, SharedFound, Speed, hold_against_model, measure_shared,
-    options_of, plan_campaign, run_campaign, run_real_campaign, set_unequal,
+    CampaignError, CampaignPlan, Found, Measured, OwnTime, PartTimes, PartsFound, Planned,
+    Question, QuestionError, RealCampaign, RealCampaignRun, SharedFound, Speed, hold_against_model,
+    measure_shared, options_of, plan_campaign, run_campaign, run_real_campaign, set_unequal,
 };
 pub use injection::{
     CoverageRow, Deadlines, Failure, Findings, FindingsError, InjectionPlan, Kind,

@@ -55,7 +55,7 @@ fn the_density_is_the_derivative_of_the_unreliability() {
         beta: 0.02,
         crews: Some(3),
         detection: Some(hours("10min")),
-        shared: vec![SharedPart { name: "power".into(), mtbf: hours("50000h") }],
+        shared: vec![SharedPart::single("power", hours("50000h"))],
         ..options(7)
     };
     for options in [plain, loaded] {
@@ -126,7 +126,7 @@ fn the_json_has_the_keys_that_others_check() {
 fn a_part_that_hardly_fails_changes_nothing() {
     let plain = calculate(&options(5)).expect("an answer");
     let mut shared = options(5);
-    shared.shared = vec![SharedPart { name: "network".into(), mtbf: hours("1e15h") }];
+    shared.shared = vec![SharedPart::single("network", hours("1e15h"))];
     let shared = calculate(&shared).expect("an answer");
     let figures = |answer: &Answer| {
         let at = answer.mission.expect("a mission");
@@ -245,7 +245,7 @@ fn a_report_is_whole_and_stands_alone() {
     asked.beta = 0.01;
     asked.convention = CommonCauseConvention::Additive;
     asked.detection = Some(hours("1h"));
-    asked.shared = vec![SharedPart { name: "<network & power>".into(), mtbf: hours("100y") }];
+    asked.shared = vec![SharedPart::single("<network & power>", hours("100y"))];
     let system = asked.system().expect("a system");
     let measured = assess(&campaign(100.0, 200.0, 300), &system, 0.95, 1).expect("an assessment");
     let provenance = Provenance {

@@ -117,8 +117,8 @@ fn shared_parts_and_common_causes_end_it_from_every_state() {
     let plain = system(5, 1, Rule::AsBuilt, 10_000.0, 24.0);
     let mut shared = plain.clone();
     shared.shared = vec![
-        SharedPart { name: "network".into(), mtbf: hours(50_000.0) },
-        SharedPart { name: "power".into(), mtbf: hours(200_000.0) },
+        SharedPart::single("network", hours(50_000.0)),
+        SharedPart::single("power", hours(200_000.0)),
     ];
     let reliability = |system: &understudy_reliability::System| {
         system.chain().unwrap().reliability(1000.0).unwrap()

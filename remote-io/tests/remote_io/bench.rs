@@ -94,6 +94,11 @@ impl Bench {
 
     /// A frame of the station `rank` in this cycle, which arrives at `now`.
     pub(crate) fn receive(&mut self, now: Time, rank: u8, alone: bool, body: Body) -> Said {
+        self.give(now, Input::Frame(&self.frame(rank, alone, body)))
+    }
+
+    /// A frame of the station `rank` in this cycle.
+    pub(crate) fn frame(&self, rank: u8, alone: bool, body: Body) -> Arc<Frame> {
         let header = Header {
             cluster: ClusterHash(1),
             configuration: ConfigurationHash(2),
@@ -102,7 +107,7 @@ impl Bench {
             sender: Member::Station(StationId(rank)),
             alone,
         };
-        self.give(now, Input::Frame(&Arc::new(Frame { header, body })))
+        Arc::new(Frame { header, body })
     }
 
     /// The deadline of this cycle.

@@ -122,6 +122,7 @@ fn remote_io(name: &str, inputs: u64) -> Item {
         group: None,
         need: Need { role: Role::RemoteIo, ..need(inputs, 0) },
         verification: Verification::NotAsked,
+        twin_of: None,
     }
 }
 

@@ -47,6 +47,7 @@ fn program(name: &str, group: Option<usize>, role: Role) -> Item {
             ethernet: false,
         },
         verification: Verification::Passed("proved".to_owned()),
+        twin_of: None,
     }
 }
 
@@ -243,4 +244,45 @@ fn the_plan_as_lines_as_a_table_and_as_a_page() {
     assert!(page.contains("<strong>3 boxes</strong> for 4 places"));
     assert!(!page.contains("vendor=A&B"), "what comes from outside is escaped");
     assert!(!page.contains("<script"), "a page without code");
+}
+
+/// Stations, remote I/Os with twins, and networks are counted and priced, next to a cell with twins and to hot-standby pairs.
+#[test]
+fn a_bill_counts_every_box() {
+    let mut priced = Catalogue::default();
+    for model in three_sizes().controllers() {
+        let mut model = model.clone();
+        let price = if model.model == "S" { 10_000 } else { 100_000 };
+        let source = "a list".to_owned();
+        model.numbers.insert(Quantity::Price, Figure { value: price, source: source.clone() });
+        model.texts.insert(Statement::Currency, Figure { value: "EUR".to_owned(), source });
+        priced.put(model);
+    }
+    let mut items = cell();
+    items.push(program("press-io", Some(0), Role::RemoteIo));
+    let twin_of = Some("press-io".to_owned());
+    items.push(Item { twin_of, ..program("press-io-2", Some(0), Role::RemoteIo) });
+    let options = Options { networks: 1, ..Options::default() };
+    let rows = |catalogue: &Catalogue, items: &[Item]| {
+        let plan = allocate(catalogue, items, &options).expect("a plan");
+        let rows = plan.bill.iter().map(|row| {
+            let price = row.price.as_ref().map(|price| (price.hundredths, price.currency.clone()));
+            ((row.stations, row.remote_ios, row.switches, row.boxes), price)
+        });
+        (rows.collect::<Vec<_>>(), text(&plan, false))
+    };
+    let eur = |whole: u64| Some((100 * whole, "EUR".to_owned()));
+    priced.put_family("W", three_sizes().families["W"].clone());
+    let (found, shown) = rows(&priced, &items);
+    assert_eq!(found[0], ((3, 3, 1, 7), eur(600)));
+    assert_eq!(found[1], ((3, 4, 2, 9), eur(700)));
+    assert_eq!(found[2], ((4, 4, 2, 10), eur(800)));
+    assert!(shown.contains("press-io-2 (remote-io, twin of press-io)"), "{shown}");
+    assert!(shown.contains("hot-standby pairs, redundant I/O, two networks"), "{shown}");
+    assert!(shown.contains("800.00 EUR"), "{shown}");
+    let (found, shown) = rows(&three_sizes(), &items);
+    assert_eq!(found[2], ((4, 4, 2, 10), None), "no price is known");
+    assert!(!shown.contains("price without"), "{shown}");
+    let (found, _) = rows(&three_sizes(), &items[..3]);
+    assert_eq!(found, [], "without remote I/Os it is not a cell");
 }

@@ -10,12 +10,12 @@ use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
 use understudy_reliability::{
-    AccelerationBias, Assessment, Hours, Interval, ReliabilityError, acceleration_bias, assess,
-    grouped,
+    AccelerationBias, Assessment, Hours, Interval, Probability, REMOTE_IO_PAIR, ReliabilityError,
+    SharedPart, acceleration_bias, assess, grouped,
 };
 
 use super::question::Planned;
-use super::{CampaignPlan, Measured, OwnTime};
+use super::{CampaignPlan, HOUR_NS, Measured, OwnTime, PartsFound};
 
 /// Of all intervals.
 const CONFIDENCE: f64 = 0.95;
@@ -29,6 +29,8 @@ pub struct Found {
     pub mode: &'static str,
     /// What was done.
     pub plan: CampaignPlan,
+    /// Period of the cluster, in nanoseconds.
+    pub period_ns: f64,
     /// Cycles that were run.
     pub cycles: u64,
     /// What the protocol needed.
@@ -45,6 +47,8 @@ pub struct Found {
     pub assessment: Assessment,
     /// Failures that were masked, of those that should have been.
     pub masked: (u64, u64),
+    /// Remote I/Os and networks; nothing where they do not fail.
+    pub parts: Option<PartsFound>,
     /// What must never happen and did.
     pub violations: Vec<String>,
     /// What a reader has to know of the run besides.
@@ -68,6 +72,14 @@ pub fn hold_against_model(
     let bias = acceleration_bias(&planned.system, own, factor, planned.forced)?;
     let mut campaigned = planned.system.clone();
     campaigned.detection = Some(time(cycles * factor).map_err(one)?);
+    let parts = measured.parts;
+    if parts.switchovers > 0 {
+        let share = 1.0 - parts.unmasked as f64 / parts.switchovers as f64;
+        let switchover = Probability::new("the coverage of the switchover", share).map_err(one)?;
+        let has_twins = |part: &&mut SharedPart| part.name == REMOTE_IO_PAIR;
+        let pairs = campaigned.shared.iter_mut().filter(has_twins).flat_map(|it| &mut it.pair);
+        pairs.for_each(|pair| pair.switchover = switchover);
+    }
     let assessment = assess(&measured.campaign, &campaigned, CONFIDENCE, planned.plan.seed)?;
     let closed = planned.closed_form_hours;
     Ok(Found {
@@ -77,6 +89,7 @@ pub fn hold_against_model(
             Mode::Paper => "paper",
         },
         plan: planned.plan,
+        period_ns: planned.period_hours * HOUR_NS,
         cycles: measured.cycles,
         own: measured.own,
         mttf_closed_form_hours: closed,
@@ -84,6 +97,8 @@ pub fn hold_against_model(
         own_time_bias: assessment.model_hours / closed - 1.0,
         bias,
         assessment,
+        parts: (planned.plan.remote_io.is_some() || planned.plan.network.is_some())
+            .then_some(parts),
         masked: (measured.campaign.masked, measured.campaign.box_failures),
         violations: measured.violations,
         remarks: measured.remarks,
@@ -187,6 +202,15 @@ impl Found {
         let cycles = |cycles: Option<f64>| {
             cycles.map_or("none".to_owned(), |cycles| format!("{cycles:.2} cycles"))
         };
+        if let Some(parts) = &self.parts {
+            let PartsFound { remote_ios, networks, switchovers, unmasked, .. } = parts;
+            let longest = parts.longest_ns as f64 / self.period_ns;
+            lines.push(("failures of remote I/Os, networks", format!("{remote_ios}, {networks}")));
+            lines.push((
+                "switchovers to a twin",
+                format!("{switchovers}, of which {unmasked} failed; the longest took {longest:.2} cycles"),
+            ));
+        }
         lines.push(("detected after", cycles(self.own.detection_cycles)));
         lines.push(("states taken over after a restart", cycles(self.own.taking_over_cycles)));
         lines.push(("and proved in shadow after", cycles(self.own.shadow_cycles)));

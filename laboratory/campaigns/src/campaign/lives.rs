@@ -87,9 +87,9 @@ const STALL_CYCLES: u64 = 10;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Order {
     /// So many cycles from now on.
-    Do { station: StationId, action: Action, after_cycles: f64 },
-    /// What was ordered to this station and is not done yet is not to be done.
-    Forget(StationId),
+    Do { member: Member, action: Action, after_cycles: f64 },
+    /// What was ordered to this member and is not done yet is not to be done.
+    Forget(Member),
 }
 
 /// The newest failure of a station.
@@ -159,7 +159,8 @@ impl<'a> Lives<'a> {
             _ => self.plan.mttr_cycles,
         };
         let drawn: f64 = Exp1.sample(&mut self.random);
-        self.orders.push(Order::Do { station, action, after_cycles: mean * drawn });
+        let member = Member::Station(station);
+        self.orders.push(Order::Do { member, action, after_cycles: mean * drawn });
     }
 
     /// Whom the crews work on from now on, where there are fewer of them than boxes to repair: any of these is as likely as any other.
@@ -178,7 +179,7 @@ impl<'a> Lives<'a> {
             return;
         }
         for &station in &down {
-            self.orders.push(Order::Forget(station));
+            self.orders.push(Order::Forget(Member::Station(station)));
         }
         for _ in 0..crews.min(down.len()) {
             let drawn = self.random.random_range(0..down.len());
@@ -227,6 +228,8 @@ impl<'a> Lives<'a> {
             Seen::Violation(what) => self.run.violations.push(what),
             // The replica has ended with it.
             Seen::Lost(_) => {}
+            // These are no stations.
+            Seen::Gone(_) | Seen::Back(_) | Seen::Part(..) | Seen::Network(..) => {}
         }
     }
 

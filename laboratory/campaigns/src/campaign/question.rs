@@ -3,12 +3,12 @@
 use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
 use understudy_reliability::{
-    Hours, MAXIMUM_ACCELERATION, Options, ReliabilityError, Rule, System, UNDERSTUDIES,
-    UnequalBoxes, acceleration_bias, grouped,
+    Hours, MAXIMUM_ACCELERATION, Networks, Options, ReliabilityError, RemoteIos, Rule, System,
+    UNDERSTUDIES, UnequalBoxes, acceleration_bias, grouped,
 };
 use understudy_wire::Member;
 
-use super::CampaignPlan;
+use super::{CampaignPlan, PartTimes};
 
 /// Cycles of a mean repair, where nobody says how fast the campaign is.
 const CYCLES_OF_A_REPAIR: f64 = 50.0;
@@ -37,6 +37,10 @@ pub struct Question {
     pub mtbf: Hours,
     /// Mean time to repair one, from its detection on.
     pub mttr: Hours,
+    /// MTBF and MTTR of a remote I/O; nothing: they do not fail.
+    pub remote_io: Option<(Hours, Hours)>,
+    /// MTBF and MTTR of a network; nothing: they do not fail.
+    pub network: Option<(Hours, Hours)>,
     /// Stations that are repaired at the same time, at most.
     pub crews: Option<u32>,
     /// Failures of the system to wait for.
@@ -108,6 +112,8 @@ pub fn plan_campaign(
     };
     let mut options = options_of(cluster, question.mtbf, question.mttr);
     options.crews = question.crews;
+    options.remote_ios = question.remote_io.map(|times| remote_ios_of(cluster, times));
+    options.networks = question.network.map(|times| networks_of(cluster, times));
     let system = options.system().map_err(all)?;
     let closed_form_hours =
         system.chain().and_then(|chain| chain.mttf().map_err(|error| vec![error])).map_err(all)?;
@@ -121,6 +127,10 @@ pub fn plan_campaign(
     let period = Hours::new("the period", period_hours).map_err(|error| all(vec![error]))?;
     acceleration_bias(&system, period, factor, question.forced).map_err(all)?;
     let cycles = |hours: f64| hours / factor / period_hours;
+    let times = |(mtbf, mttr): (Hours, Hours)| PartTimes {
+        mtbf_cycles: cycles(mtbf.get()),
+        mttr_cycles: cycles(mttr.get()),
+    };
     let plan = CampaignPlan {
         mtbf_cycles: cycles(question.mtbf.get()),
         mttr_cycles: cycles(question.mttr.get()),
@@ -129,6 +139,8 @@ pub fn plan_campaign(
         failures: question.failures,
         seed: question.seed,
         maximum_cycles: (PATIENCE * cycles(closed_form_hours)).max(PATIENCE) as u64,
+        remote_io: question.remote_io.map(times),
+        network: question.network.map(times),
         threads: std::thread::available_parallelism().map_or(1, usize::from),
     };
     Ok(Planned { plan, options, system, closed_form_hours, period_hours, forced: question.forced })
@@ -193,6 +205,18 @@ pub fn set_unequal(
         options.unequal.push(boxes);
     }
     errors
+}
+
+/// The remote I/Os of a cluster with their twins.
+fn remote_ios_of(cluster: &Cluster, (mtbf, mttr): (Hours, Hours)) -> RemoteIos {
+    let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+    let (all, twins) = (count(cluster.remote_ios().len()), count(cluster.twins().len()));
+    RemoteIos { count: all, twins, mtbf, mttr, switchover: 1.0, beta: 0.0 }
+}
+
+/// The networks of a cluster.
+fn networks_of(cluster: &Cluster, (mtbf, mttr): (Hours, Hours)) -> Networks {
+    Networks { count: 1 + u32::from(cluster.has_two_networks()), mtbf, mttr, beta: 0.0 }
 }
 
 /// The boxes of a cluster, its mode, and the given times.

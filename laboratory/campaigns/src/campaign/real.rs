@@ -181,10 +181,7 @@ impl<'a> Fates<'a> {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 of_station(station, event)
             }
-            (
-                Happening::RemoteIo(event),
-                Some(Member::RemoteIo(program) | Member::Twin(program)),
-            ) => self.deadlines.look(now, program, event),
+            (Happening::RemoteIo(event), Some(member)) => self.deadlines.look(now, member, event),
             (Happening::Run(RunEvent::Fault { action, member, .. }), _) => match (member, action) {
                 (Member::Station(station), Action::Crash) => Some(Seen::Crashed(*station)),
                 (Member::Station(station), Action::Restart) => Some(Seen::Restarted(*station)),
@@ -197,19 +194,15 @@ impl<'a> Fates<'a> {
     fn carry_out_orders(&mut self, now: Instant) {
         for order in self.lives.take_orders() {
             match order {
-                Order::Do { station, action, after_cycles } => {
+                Order::Do { member, action, after_cycles } => {
                     // A wait that no clock can hold is longer than any limit.
                     let after =
                         Duration::try_from_secs_f64(self.period.as_secs_f64() * after_cycles);
                     let at = after.ok().and_then(|after| now.checked_add(after));
-                    let fault =
-                        Fault { at_cycle: 0, phase: 0.0, member: Member::Station(station), action };
+                    let fault = Fault { at_cycle: 0, phase: 0.0, member, action };
                     self.due.extend(at.map(|at| (at, fault)));
                 }
-                Order::Forget(station) => {
-                    let member = Member::Station(station);
-                    self.due.retain(|(_, fault)| fault.member != member);
-                }
+                Order::Forget(member) => self.due.retain(|(_, fault)| fault.member != member),
             }
         }
         self.due.sort_by_key(|(at, _)| *at);

@@ -8,6 +8,7 @@ use understudy_wire::{Member, Time};
 
 use super::CampaignPlan;
 use super::lives::{Lives, Order, Run};
+use super::parts::{Parts, PartsFound};
 use super::seen::{Deadlines, Seen, of_station};
 use understudy_simulator::parts;
 
@@ -19,13 +20,16 @@ pub(super) fn simulated(
     cluster: &Cluster,
     plan: &CampaignPlan,
     number: u64,
-) -> Result<Run, NotReady> {
+) -> Result<(Run, PartsFound), NotReady> {
+    let mut series = Parts::new(cluster, plan, number);
     let mut lives = Lives::new(cluster, plan, number);
     let mut simulation = Simulation::new(parts(cluster), Network::default(), lives.draw_seed());
     simulation.run(0, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
     let origin = simulation.now();
     lives.begin();
-    carry_out(&mut simulation, &mut lives);
+    series.begin(|program| simulation.author(program));
+    carry_out(&mut simulation, lives.take_orders());
+    carry_out(&mut simulation, series.take_orders());
     let mut deadlines = Deadlines::new(cluster.controllers().len());
     let seen = RefCell::new(Vec::new());
     let mut observe = |now: Time, _: Option<u64>, member: Member, record: Record<'_>| {
@@ -35,30 +39,37 @@ pub(super) fn simulated(
     let mut over = || !seen.borrow().is_empty();
     while simulation.go_on(plan.maximum_cycles, &mut observe, &mut over) {
         for (now, found) in seen.take() {
-            if let Seen::Lost(since) = found {
-                return Ok(lives.end(since, since.0 - origin.0, true));
+            if let Some((since, cause)) = series.see(now, &found) {
+                let run = lives.end(since, since.0 - origin.0, true);
+                return Ok((Run { cause: Some(cause), ..run }, series.into_found()));
             }
-            lives.see(now, found);
+            if let Seen::Lost(since) = found {
+                return Ok((lives.end(since, since.0 - origin.0, true), series.into_found()));
+            }
+            if !(found == Seen::Missed && series.explains(now)) {
+                lives.see(now, found);
+            }
         }
-        carry_out(&mut simulation, &mut lives);
+        carry_out(&mut simulation, lives.take_orders());
+        carry_out(&mut simulation, series.take_orders());
     }
     let now = simulation.now();
-    Ok(lives.end(now, now.0 - origin.0, false))
+    Ok((lives.end(now, now.0 - origin.0, false), series.into_found()))
 }
 
-pub(super) fn carry_out(simulation: &mut Simulation, lives: &mut Lives<'_>) {
-    for order in lives.take_orders() {
+pub(super) fn carry_out(simulation: &mut Simulation, orders: Vec<Order>) {
+    for order in orders {
         match order {
-            Order::Do { station, action, after_cycles } => {
+            Order::Do { member, action, after_cycles } => {
                 let at = simulation.cycle_time().unwrap_or(0.0) + after_cycles;
                 simulation.schedule(Fault {
                     at_cycle: at as u64,
                     phase: at.fract(),
-                    member: Member::Station(station),
+                    member,
                     action,
                 });
             }
-            Order::Forget(station) => simulation.forget(Member::Station(station)),
+            Order::Forget(member) => simulation.forget(member),
         }
     }
 }
@@ -74,13 +85,19 @@ pub(super) fn look(
         (Member::Station(station), Record::Fault(fault)) => match fault.action {
             Action::Crash => Some(Seen::Crashed(station)),
             Action::Restart => Some(Seen::Restarted(station)),
+            // A network fails for all members, of which this is the first.
+            Action::Unplug { network } if station.0 == 0 => Some(Seen::Network(network, false)),
+            Action::Plug { network } if station.0 == 0 => Some(Seen::Network(network, true)),
             _ => None,
         },
         (_, Record::Violation(violation)) => Some(Seen::Violation(violation.to_string())),
         (Member::Station(station), Record::Station(event)) => of_station(station, event),
-        (Member::RemoteIo(program) | Member::Twin(program), Record::RemoteIo(event)) => {
-            deadlines.look(now, program, event)
-        }
+        (Member::RemoteIo(_) | Member::Twin(_), Record::Fault(fault)) => match fault.action {
+            Action::Crash => Some(Seen::Gone(member)),
+            Action::Restart => Some(Seen::Back(member)),
+            _ => None,
+        },
+        (_, Record::RemoteIo(event)) => deadlines.look(now, member, event),
         _ => None,
     }
 }

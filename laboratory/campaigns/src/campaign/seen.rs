@@ -2,7 +2,7 @@
 
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_wire::{ProgramId, Source, StationId, Time};
+use understudy_wire::{Member, Part, ProgramId, Source, StationId, Time, Via};
 
 /// What a campaign has to answer, in the order in which it was seen.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,14 @@ pub(super) enum Seen {
     Cleared(StationId),
     Adopted(StationId, ProgramId),
     Synchronised(StationId, ProgramId),
+    /// A remote I/O has failed.
+    Gone(Member),
+    /// A remote I/O starts again.
+    Back(Member),
+    /// The part of one of two remote I/Os.
+    Part(Member, Part),
+    /// Whether a network works.
+    Network(Via, bool),
     /// The first deadline of a remote I/O with nothing true to apply.
     Missed,
     /// A remote I/O is at its fail-safe; the first deadline with nothing true to apply.
@@ -32,6 +40,7 @@ impl Seen {
             | Self::Cleared(station)
             | Self::Adopted(station, _)
             | Self::Synchronised(station, _) => Some(*station),
+            Self::Gone(_) | Self::Back(_) | Self::Part(..) | Self::Network(..) => None,
             Self::Missed | Self::Lost(_) | Self::Stalled | Self::Violation(_) => None,
         }
     }
@@ -50,13 +59,17 @@ impl Deadlines {
     pub(super) fn look(
         &mut self,
         now: Time,
-        program: ProgramId,
+        member: Member,
         event: &RemoteIoEvent,
     ) -> Option<Seen> {
+        let (Member::RemoteIo(program) | Member::Twin(program)) = member else {
+            return None;
+        };
         let source = match event {
             RemoteIoEvent::Flagged { station, .. } => return Some(Seen::Flagged(*station)),
             RemoteIoEvent::Cleared { station, .. } => return Some(Seen::Cleared(*station)),
             RemoteIoEvent::Stalled { .. } => return Some(Seen::Stalled),
+            RemoteIoEvent::PartChanged { part, .. } => return Some(Seen::Part(member, *part)),
             RemoteIoEvent::Applied { source, .. } => *source,
             _ => return None,
         };

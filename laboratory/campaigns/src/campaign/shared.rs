@@ -244,7 +244,7 @@ fn simulated(
         let mut simulation = Simulation::new(parts(cluster), Network::default(), lives.draw_seed());
         simulation.run(0, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         lives.begin();
-        carry_out(&mut simulation, &mut lives);
+        carry_out(&mut simulation, lives.take_orders());
         let deadlines = Deadlines::new(cluster.controllers().len());
         let origin = simulation.now();
         let slots = agreement.schedule.spare_slots();
@@ -299,7 +299,7 @@ fn simulated(
                 }
             }
             let group = &mut all[place];
-            carry_out(&mut group.simulation, &mut group.lives);
+            carry_out(&mut group.simulation, group.lives.take_orders());
         }
         for SpareOrder { group, slot, action } in orders {
             let member = Member::Station(slot);

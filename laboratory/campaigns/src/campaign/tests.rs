@@ -2,7 +2,7 @@ use understudy_cycle::Mode;
 use understudy_reliability::Hours;
 use understudy_simulator::{Action, SpareTimes};
 use understudy_testing::press_cell;
-use understudy_wire::{ProgramId, StationId, Time};
+use understudy_wire::{Member, ProgramId, StationId, Time};
 
 use super::lives::{Lives, Order};
 use super::seen::Seen;
@@ -18,6 +18,8 @@ fn plan(failures: u64, threads: usize) -> CampaignPlan {
         seed: 3,
         maximum_cycles: 1_000_000,
         threads,
+        remote_io: None,
+        network: None,
     }
 }
 
@@ -69,6 +71,8 @@ fn the_model_with_the_protocols_own_time_lies_in_the_interval() {
         let question = Question {
             mtbf: hours(300.0),
             mttr: hours(50.0),
+            remote_io: None,
+            network: None,
             crews,
             failures: 60,
             seed: 1,
@@ -97,8 +101,8 @@ fn orders(lives: &mut Lives<'_>) -> Vec<(StationId, Action)> {
     let orders = lives.take_orders().into_iter();
     orders
         .filter_map(|order| match order {
-            Order::Do { station, action, .. } => Some((station, action)),
-            Order::Forget(_) => None,
+            Order::Do { member: Member::Station(station), action, .. } => Some((station, action)),
+            Order::Do { .. } | Order::Forget(_) => None,
         })
         .collect()
 }
@@ -151,7 +155,7 @@ fn one_crew_works_on_one_station_at_a_time() {
     let ordered = lives.take_orders();
     let forgotten = ordered.iter().filter(|order| matches!(order, Order::Forget(_)));
     assert_eq!(forgotten.count(), 2, "{ordered:?}");
-    let Some(Order::Do { station, .. }) = ordered.last() else {
+    let Some(Order::Do { member: Member::Station(station), .. }) = ordered.last() else {
         panic!("{ordered:?}");
     };
     lives.see(Time(3), Seen::Restarted(*station));
@@ -187,6 +191,8 @@ fn groups_that_share_a_spare_live_as_long_as_the_model_says() {
     let question = Question {
         mtbf: hours(1500.0),
         mttr: hours(300.0),
+        remote_io: None,
+        network: None,
         crews: None,
         failures: 40,
         seed: 1,
@@ -205,4 +211,35 @@ fn groups_that_share_a_spare_live_as_long_as_the_model_says() {
     assert!(one.model_hours > 1.5 * one.without_hours, "{}", one.to_text());
     assert!(one.joined_cycles.is_some_and(|cycles| cycles < 20.0), "{}", one.to_text());
     assert_eq!(one.mttf_hours, two.mttf_hours, "on any number of threads");
+}
+
+/// The press cell without a single point of failure above its devices: two networks, an understudy, twins.
+const WHOLE_CELL: &str = include_str!("../../../../examples/twin-remote-io/cluster.toml");
+
+/// Stations, remote I/Os and networks fail: the cell lives as long as the model of all of them says, by each of its causes.
+#[test]
+fn a_whole_cell_lives_as_long_as_the_model_says() {
+    let cell = understudy_testing::cluster(WHOLE_CELL, Mode::Full);
+    let times = |mtbf, mttr| Some((hours(mtbf), hours(mttr)));
+    let question = Question {
+        mtbf: hours(1500.0),
+        mttr: hours(150.0),
+        remote_io: times(1500.0, 150.0),
+        network: times(1500.0, 150.0),
+        crews: None,
+        failures: 60,
+        seed: 1,
+        speed: Speed::Factor(1.0),
+        forced: false,
+    };
+    let planned = plan_campaign(&cell, &question).expect("a campaign");
+    let measured = run_campaign(&cell, &planned.plan, &mut |_| {}).expect("synchronised");
+    let found = hold_against_model(&cell, &planned, measured).expect("an assessment");
+    let text = found.to_text();
+    assert!(found.is_met(), "{text}");
+    let parts = found.parts.expect("they fail");
+    assert!(parts.remote_ios > 60 && parts.networks > 30 && parts.switchovers > 30, "{text}");
+    for cause in ["both networks", "after its twin", "understudy"] {
+        assert!(found.assessment.causes.keys().any(|it| it.contains(cause)), "{cause}: {text}");
+    }
 }

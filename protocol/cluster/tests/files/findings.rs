@@ -552,4 +552,25 @@ fn twins() {
     assert!(check(taken, &tcp, "").contains("U0208"));
     let address = named(", address = \"10.0.1.11:7450\"");
     assert!(check(&address, &tcp, "").contains("U0210"));
+    for key in ["author = true", "direct = \"10.0.1.61:7450\""] {
+        let found = check(&named(&format!(", {key}")), &tcp, "");
+        assert!(
+            found.contains("U0205"),
+            "neither is configured as author, and no link is direct: {found}"
+        );
+    }
+    // A simulated plant must wait until the twin has taken over.
+    let plant = |watchdog: u32| {
+        format!(
+            "[[plant]]\nname = \"arm\"\ncontroller = \"robot\"\nmodel = \"robot\"\nwatchdog_cycles = {watchdog}\n"
+        )
+    };
+    for (after, least) in [(1, 4), (3, 6)] {
+        let twin = named(&format!(", take_over_after = {after}"));
+        let found = check(&twin, "", &plant(least - 1));
+        let wanted = format!("watchdog_cycles = {least}");
+        assert!(found.contains("U0258") && found.contains(&wanted), "{found}");
+        assert!(found.contains("before `robot-io-2` has taken over"), "{found}");
+        assert!(!check(&twin, "", &plant(least)).contains("U0258"), "{after}");
+    }
 }

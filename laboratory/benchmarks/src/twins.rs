@@ -1,0 +1,307 @@
+//! `understudy-bench twins`: a cell of two networks, an understudy and twins on Modbus devices that record their writers. Processes are killed and
+//! suspended, and networks cut, at random phases of the cycle, one or two at once.
+
+mod device;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+use understudy::{Answer, ClusterRun, Console, RunArguments, Status};
+use understudy_cluster::Cluster;
+use understudy_scenarios::{Action, Fault, Scenario};
+use understudy_wire::{Member, ProgramId, StationId, Via};
+
+use device::{Device, Recorded};
+
+/// Kill and suspend members of a cell with twins and cut its networks, in front of devices that record who writes them
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Faults in all; a fifth of them come two at once
+    #[arg(long, default_value_t = 500)]
+    count: u32,
+    /// `take_over_after` of the twins
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
+    take_over_after: u32,
+    /// Folder for the files of the cell
+    #[arg(long, value_name = "DIR", default_value = "twins-bench")]
+    folder: PathBuf,
+    /// Seed of the faults and their phases
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    run: RunArguments,
+}
+
+/// Cycles from the end of one fault to the next: enough for a new connection to the device and a synchronised station.
+const RECOVERY_CYCLES: f64 = 80.0;
+
+/// Cycles from a kill to the restart, and of a cut.
+const DOWN_CYCLES: f64 = 20.0;
+
+const ROBOT: &str = include_str!("../../../examples/press-cell/robot.ladder");
+
+/// What fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Target {
+    Stations,
+    RemoteIos,
+    Networks,
+    /// Two of all at one time.
+    Two,
+}
+
+impl Target {
+    const ALL: [Self; 4] = [Self::Stations, Self::RemoteIos, Self::Networks, Self::Two];
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Stations => "one station",
+            Self::RemoteIos => "one remote I/O",
+            Self::Networks => "one network",
+            Self::Two => "two at once",
+        }
+    }
+
+    /// Faults of this kind, of `count` in all.
+    fn share(self, count: u32) -> u32 {
+        let two = count / 5;
+        match self {
+            Self::Two => two,
+            Self::RemoteIos => (count - two).div_ceil(2),
+            Self::Stations | Self::Networks => (count - two) / 4,
+        }
+    }
+}
+
+/// One fault: its steps from a cycle on, and the last one.
+fn fault(cluster: &Cluster, of: Target, begin: f64, random: &mut Pcg64Mcg) -> (Vec<Fault>, f64) {
+    let begin = begin + random.random::<f64>();
+    let step = |at: f64, member: Member, action: Action| Fault {
+        at_cycle: at as u64,
+        phase: at.fract(),
+        member,
+        action,
+    };
+    if of == Target::Networks {
+        let network = if random.random() { Via::First } else { Via::Second };
+        let end = begin + DOWN_CYCLES;
+        let all = cluster.members().flat_map(|member| {
+            let cut = step(begin, member, Action::Unplug { network });
+            [cut, step(end, member, Action::Plug { network })]
+        });
+        return (all.collect(), end);
+    }
+    let member = match of {
+        Target::RemoteIos => {
+            let program = ProgramId(random.random_range(0..2));
+            if random.random() { Member::RemoteIo(program) } else { Member::Twin(program) }
+        }
+        _ => Member::Station(StationId(random.random_range(0..3))),
+    };
+    let (lasts, begins, ends) = if random.random() {
+        (DOWN_CYCLES, Action::Crash, Action::Restart)
+    } else {
+        (random.random_range(0.5..DOWN_CYCLES), Action::Stop, Action::Continue)
+    };
+    let steps = vec![step(begin, member, begins), step(begin + lasts, member, ends)];
+    (steps, begin + lasts)
+}
+
+/// `count` faults of one kind, one after the other.
+fn scenario(cluster: &Cluster, of: Target, count: u32, random: &mut Pcg64Mcg) -> Scenario {
+    let every = DOWN_CYCLES + RECOVERY_CYCLES;
+    let mut steps = Vec::new();
+    for number in 0..count {
+        let begin = RECOVERY_CYCLES + every * f64::from(number);
+        let single = [Target::Stations, Target::RemoteIos, Target::Networks];
+        let kinds = match of {
+            Target::Two => {
+                vec![single[random.random_range(0..3)], single[random.random_range(0..3)]]
+            }
+            one => vec![one],
+        };
+        let mut members: Vec<(Member, Action)> = Vec::new();
+        for kind in kinds {
+            // Two of one member are one.
+            loop {
+                let (found, _) = fault(cluster, kind, begin, random);
+                let is_new = |step: &Fault| {
+                    !members.iter().any(|(member, action)| {
+                        let is_cut = |it: &Action| matches!(it, Action::Unplug { .. });
+                        *member == step.member
+                            && is_cut(action) == is_cut(&step.action)
+                            && (!is_cut(action) || *action == step.action)
+                    })
+                };
+                if found.first().is_some_and(is_new) {
+                    members.extend(found.first().map(|step| (step.member, step.action)));
+                    steps.extend(found);
+                    break;
+                }
+            }
+        }
+    }
+    steps.sort_by(|a, b| (a.at_cycle as f64 + a.phase).total_cmp(&(b.at_cycle as f64 + b.phase)));
+    Scenario {
+        title: format!("{count} faults, {}", of.words()),
+        cycles: (RECOVERY_CYCLES * 2.0 + every * f64::from(count)) as u64,
+        steps,
+        ..Scenario::default()
+    }
+}
+
+/// The cluster file, with the devices of its programs.
+fn files(folder: &Path, devices: &[Device], take_over_after: u32) -> std::io::Result<PathBuf> {
+    let mut text = "[cluster]\nname = \"twins\"\nperiod = \"10ms\"\nnetworks = 2\n".to_owned();
+    for name in ["left", "right"] {
+        let _ = writeln!(text, "[[controller]]\nname = \"{name}\"\nladder = \"robot.ladder\"");
+    }
+    text.push_str("[[understudy]]\nname = \"understudy\"\n");
+    for (name, device) in ["left", "right"].into_iter().zip(devices) {
+        let _ = write!(
+            text,
+            "[[remote_io]]\nname = \"{name}-io\"\ncontroller = \"{name}\"\n\
+             twin = {{ name = \"{name}-io-2\", wiring = \"exclusive\", take_over_after = {take_over_after} }}\n\
+             [remote_io.field]\nmodbus = \"{}\"\n\
+             inputs = {{ part_present = \"discrete:0\", arm_left = \"discrete:1\", arm_right = \"discrete:2\", arm_up = \"discrete:3\", arm_down = \"discrete:4\", stop = \"discrete:5\" }}\n\
+             outputs = {{ move_right = \"coil:0\", move_left = \"coil:1\", move_down = \"coil:2\", move_up = \"coil:3\", grip = \"coil:4\" }}\n",
+            device.address
+        );
+    }
+    fs::create_dir_all(folder)?;
+    fs::write(folder.join("robot.ladder"), ROBOT)?;
+    let file = folder.join("cluster.toml");
+    fs::write(&file, text)?;
+    Ok(file)
+}
+
+/// Result of the faults of one kind.
+#[derive(Debug, Serialize)]
+struct Row {
+    fault: &'static str,
+    count: u32,
+    directory: String,
+    /// Wrong outputs, and what else must not happen.
+    wrong: u64,
+    /// What it was.
+    violations: Vec<String>,
+    /// Deadlines with the last true output.
+    held: u64,
+    /// Deadlines with the fail-safe output.
+    fail_safe: u64,
+    /// Held and fail-safe deadlines during host stalls.
+    by_stall: u64,
+    /// Writes that the devices received.
+    writes: u64,
+    /// Connections that have written.
+    writers: u64,
+    /// Writes of a connection after a later one had written.
+    by_two: u64,
+    /// Longest time between two writes of a device, in periods.
+    longest_gap_cycles: f64,
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let failed = |error: std::io::Error| Answer::failed(Status::Failed, "U0602", error);
+    let devices = [Device::start().map_err(failed)?, Device::start().map_err(failed)?];
+    let file = files(&arguments.folder, &devices, arguments.take_over_after).map_err(failed)?;
+    let mut random = Pcg64Mcg::seed_from_u64(arguments.seed);
+    let mut rows = Vec::new();
+    for of in Target::ALL {
+        let count = of.share(arguments.count);
+        if count > 0 {
+            rows.push(row(of, count, &file, &devices, arguments, &mut random, console)?);
+        }
+    }
+    Ok(answer(&rows))
+}
+
+fn row(
+    of: Target,
+    count: u32,
+    file: &Path,
+    devices: &[Device; 2],
+    arguments: &Arguments,
+    random: &mut Pcg64Mcg,
+    console: &mut Console,
+) -> Result<Row, Answer> {
+    let cell = ClusterRun::of_file(file.to_owned(), &arguments.run)?;
+    let scenario = scenario(&cell.cluster, of, count, random).shortened(arguments.run.cycles);
+    console.note(&scenario.title);
+    for device in devices {
+        device.take();
+    }
+    let (summary, judged) = cell.judged(&scenario, &arguments.run, console)?;
+    if let Some(failure) = judged.failure {
+        return Err(Answer::failed(Status::Failed, failure.code(), &failure));
+    }
+    let recorded = devices.each_ref().map(Device::take);
+    let sum = |of: fn(&Recorded) -> u64| recorded.iter().map(of).sum();
+    let longest = recorded.iter().map(|it| it.longest_gap).max().unwrap_or(Duration::ZERO);
+    let total = summary.total();
+    Ok(Row {
+        fault: of.words(),
+        count,
+        directory: cell.path().display().to_string(),
+        wrong: summary.violation_count,
+        violations: summary
+            .violations
+            .iter()
+            .take(5)
+            .map(|it| format!("cycle {}, {}: {}", it.cycle, it.name, it.what))
+            .collect(),
+        held: total.held,
+        fail_safe: total.fail_safe,
+        by_stall: total.held_by_stall + total.fail_safe_by_stall,
+        writes: sum(|it| it.writes),
+        writers: sum(|it| it.writers),
+        by_two: sum(|it| it.by_two),
+        longest_gap_cycles: longest.as_secs_f64()
+            / cell.cluster.agreement().schedule.period().as_secs_f64(),
+    })
+}
+
+fn answer(rows: &[Row]) -> Answer {
+    let mut text = format!(
+        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>12}\n",
+        "fault",
+        "count",
+        "wrong",
+        "held",
+        "fail-safe",
+        "by stall",
+        "writes",
+        "writers",
+        "two writers",
+        "longest gap"
+    );
+    for row in rows {
+        let _ = writeln!(
+            text,
+            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>12.1}",
+            row.fault,
+            row.count,
+            row.wrong,
+            row.held,
+            row.fail_safe,
+            row.by_stall,
+            row.writes,
+            row.writers,
+            row.by_two,
+            row.longest_gap_cycles
+        );
+        for violation in &row.violations {
+            let _ = writeln!(text, "    {violation}");
+        }
+    }
+    text.push_str("held and fail-safe are deadlines of all remote I/Os; the longest gap is that between two writes of a device, in periods\n");
+    let passed = rows.iter().all(|row| row.wrong == 0 && row.by_two == 0);
+    let status = if passed { Status::Done } else { Status::Failed };
+    Answer::done(text, rows).with_status(status)
+}

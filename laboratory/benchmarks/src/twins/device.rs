@@ -1,0 +1,191 @@
+//! A Modbus TCP device that records who writes it.
+//!
+//! A writer is a connection. Two writers at one time are found by their order: once a connection has written, an earlier one must not write any more.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Coils and discrete inputs.
+const POINTS: usize = 64;
+
+/// Time for which the inputs keep their values.
+const INPUTS_CHANGE: Duration = Duration::from_millis(300);
+
+/// What was recorded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Recorded {
+    /// Writes.
+    pub(super) writes: u64,
+    /// Connections that have written.
+    pub(super) writers: u64,
+    /// Writes of a connection after a later one had written.
+    pub(super) by_two: u64,
+    /// Longest time between two writes.
+    pub(super) longest_gap: Duration,
+}
+
+#[derive(Debug)]
+struct State {
+    coils: [bool; POINTS],
+    recorded: Recorded,
+    /// The newest connection that has written.
+    writer: Option<u64>,
+    last: Option<Instant>,
+    began: Instant,
+}
+
+/// The device; it ends with the process.
+#[derive(Debug, Clone)]
+pub(super) struct Device {
+    pub(super) address: SocketAddr,
+    state: Arc<Mutex<State>>,
+}
+
+impl Device {
+    /// A device on a free port of this machine.
+    ///
+    /// # Errors
+    /// No port can be opened.
+    pub(super) fn start() -> std::io::Result<Self> {
+        let listener = TcpListener::bind("127.0.0.1:0")?;
+        let state = State {
+            coils: [false; POINTS],
+            recorded: Recorded::default(),
+            writer: None,
+            last: None,
+            began: Instant::now(),
+        };
+        let device = Self { address: listener.local_addr()?, state: Arc::new(Mutex::new(state)) };
+        let served = device.clone();
+        std::thread::spawn(move || {
+            for (connection, stream) in (0..).zip(listener.incoming().flatten()) {
+                let served = served.clone();
+                std::thread::spawn(move || served.serve(stream, connection));
+            }
+        });
+        Ok(device)
+    }
+
+    /// What was recorded since the last call; the connections stay known.
+    pub(super) fn take(&self) -> Recorded {
+        let mut state = self.state();
+        state.last = None;
+        std::mem::take(&mut state.recorded)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn serve(&self, mut stream: TcpStream, connection: u64) {
+        let _ = stream.set_nodelay(true);
+        let mut header = [0; 7];
+        while stream.read_exact(&mut header).is_ok() {
+            // The length counts the unit too.
+            let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
+            let mut request = vec![0; length.saturating_sub(1).min(260)];
+            if request.is_empty() || stream.read_exact(&mut request).is_err() {
+                return;
+            }
+            let answer = self.answer(&request, connection);
+            let length = (answer.len() as u16 + 1).to_be_bytes();
+            let mut frame = header[..4].to_vec();
+            frame.extend(length);
+            frame.push(header[6]);
+            frame.extend(answer);
+            if stream.write_all(&frame).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn answer(&self, request: &[u8], connection: u64) -> Vec<u8> {
+        let number = |at: usize| match request.get(at..at + 2) {
+            Some(&[high, low]) => usize::from(u16::from_be_bytes([high, low])),
+            _ => POINTS,
+        };
+        let function = request[0];
+        let (first, count) = (number(1), if function == 5 { 1 } else { number(3) });
+        if first + count > POINTS {
+            return vec![function | 0x80, 2];
+        }
+        match function {
+            1 | 2 => {
+                let state = self.state();
+                let tick = state.began.elapsed().as_millis() / INPUTS_CHANGE.as_millis();
+                let bit = |at: usize| match function {
+                    1 => state.coils[at],
+                    _ => tick.wrapping_mul(0x9E37_79B9) >> (at + 3) & 1 == 1,
+                };
+                let mut bytes = vec![0_u8; count.div_ceil(8)];
+                for at in (0..count).filter(|at| bit(first + at)) {
+                    bytes[at / 8] |= 1 << (at % 8);
+                }
+                [vec![function, bytes.len() as u8], bytes].concat()
+            }
+            5 => {
+                self.write(connection, first, &[number(3) == 0xFF00]);
+                request.to_vec()
+            }
+            15 => {
+                let bytes = request.get(6..).unwrap_or_default();
+                let bit =
+                    |at: usize| bytes.get(at / 8).is_some_and(|byte| byte >> (at % 8) & 1 == 1);
+                let values: Vec<bool> = (0..count).map(bit).collect();
+                self.write(connection, first, &values);
+                request[..5].to_vec()
+            }
+            _ => vec![function | 0x80, 1],
+        }
+    }
+
+    fn write(&self, connection: u64, first: usize, values: &[bool]) {
+        let mut state = self.state();
+        state.coils[first..first + values.len()].copy_from_slice(values);
+        let now = Instant::now();
+        if state.writer.is_some_and(|newest| connection < newest) {
+            state.recorded.by_two += 1;
+        } else if state.writer != Some(connection) {
+            state.recorded.writers += 1;
+            state.writer = Some(connection);
+        }
+        state.recorded.writes += 1;
+        if let Some(last) = state.last.replace(now) {
+            state.recorded.longest_gap = state.recorded.longest_gap.max(now - last);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ask(stream: &mut TcpStream, request: &[u8]) -> Vec<u8> {
+        let length = (request.len() as u16 + 1).to_be_bytes();
+        let frame = [&[0, 1, 0, 0][..], &length, &[1], request].concat();
+        stream.write_all(&frame).expect("written");
+        let mut header = [0; 7];
+        stream.read_exact(&mut header).expect("an answer");
+        let mut answer = vec![0; usize::from(u16::from_be_bytes([header[4], header[5]])) - 1];
+        stream.read_exact(&mut answer).expect("an answer");
+        answer
+    }
+
+    #[test]
+    fn a_write_of_an_earlier_connection_is_found() {
+        let device = Device::start().expect("a port");
+        let mut first = TcpStream::connect(device.address).expect("connected");
+        let on = [15, 0, 2, 0, 3, 1, 0b101];
+        assert_eq!(ask(&mut first, &on), [15, 0, 2, 0, 3]);
+        assert_eq!(ask(&mut first, &[1, 0, 0, 0, 8]), [1, 1, 0b10100]);
+        let mut second = TcpStream::connect(device.address).expect("connected");
+        assert_eq!(ask(&mut second, &[5, 0, 2, 0, 0]), [5, 0, 2, 0, 0]);
+        assert_eq!(ask(&mut second, &[1, 0, 0, 0, 8]), [1, 1, 0b10000]);
+        assert_eq!((device.take().writers, device.take().by_two), (2, 0));
+        ask(&mut first, &on);
+        assert_eq!(device.take().by_two, 1);
+        assert_eq!(ask(&mut first, &[15, 0, 63, 0, 3, 1, 1]), [0x8F, 2], "beyond its coils");
+    }
+}
