@@ -30,6 +30,7 @@ mod reconfigure;
 mod reliability;
 mod requirements;
 mod scan;
+mod searches;
 mod terminal;
 mod twincat;
 mod verdicts;
