@@ -195,6 +195,7 @@ where
         },
         ends_with_parent: options.ends_with_parent,
         real_time: options.real_time,
+        spin: cluster.spins() && options.real_time,
     };
     let output: Box<dyn io::Write + Send> = match &options.journal {
         None => Box::new(io::stdout()),

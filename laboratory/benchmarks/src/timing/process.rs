@@ -38,6 +38,7 @@ pub(super) struct Case {
     pub(super) copies: u32,
     pub(super) measured_for: Duration,
     pub(super) real_time: bool,
+    pub(super) spin: bool,
 }
 
 impl Case {
@@ -208,6 +209,7 @@ fn play(part: Part) -> Result<(), Answer> {
         commands: Commands::ReadAndEndWithInput,
         ends_with_parent: true,
         real_time: case.real_time,
+        spin: case.spin,
     };
     let window = case.window();
     let missing = || Answer::failed(Status::BadInput, "U0607", format!("no member {own:?}"));
