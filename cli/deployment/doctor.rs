@@ -90,7 +90,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let cluster = cluster.map(|(cluster, _)| cluster);
     let agreement = cluster.as_ref().map(Cluster::agreement);
     let period = agreement.map_or(wanted, |agreement| agreement.schedule.period());
-    let mut findings = examine_machine(period);
+    let spins = cluster.as_ref().is_some_and(Cluster::spins);
+    let mut findings = examine_machine(period, spins);
     let hash = agreement.map(|agreement| agreement.configuration.to_string());
     if let Some(hash) = &hash {
         let found = format!("{hash}; must be equal on all machines");
@@ -100,7 +101,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         let member = crate::member::find(cluster, name)?;
         findings.extend(of_member(arguments, cluster, member)?);
     }
-    let look_again = || examine_machine(period);
+    let look_again = || examine_machine(period, spins);
     let fixed = arguments.fix.then(|| fix::fix(&findings, &look_again, arguments.yes, console));
     let (found, findings) = match &fixed {
         Some(fixed) => (findings.clone(), fixed.applied_to(findings)),

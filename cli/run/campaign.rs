@@ -1,5 +1,7 @@
 //! `understudy campaign`: random fault injection in simulation; failing runs are shrunk to minimal ones.
 
+mod store;
+
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -8,8 +10,8 @@ use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use understudy_bus::interruption;
 use understudy_campaigns::{
-    Findings, InjectionPlan, Kind, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, Property, Shard, inject,
-    merge, picture,
+    Findings, InjectionPlan, Kind, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, Property, Shard, Store,
+    inject, merge, picture,
 };
 
 use crate::answer::{Answer, Status};
@@ -17,6 +19,9 @@ use crate::console::Console;
 use crate::files;
 use crate::overrides::OverrideArguments;
 use crate::run::simulate::seed_of_the_clock;
+
+/// Number of runs of a campaign without a store.
+const USUAL_RUNS: u64 = 1000;
 
 /// Inject random faults in simulation and shrink failing runs
 #[derive(Debug, Args)]
@@ -29,9 +34,13 @@ Example:
   understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 1/2 --out shard-1
   understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 2/2 --out shard-2
   understudy campaign merge shard-* --out campaign
+  understudy campaign examples/press-cell/cluster.toml --forever store --seeds 2 --runs 20 --out campaign
 
 Equal seeds and numbers of runs give equal findings on any number of processors and shards. DIR receives campaign.json, campaign.html and
 a scenario for each failure, which `understudy simulate` replays. Ctrl-C ends the campaign with partial findings.
+
+With `--forever` a process runs seeds that are not yet in STORE, a folder that any number of processes and machines share, and keeps the findings of
+each: the smallest and the fastest failure for each set of kinds of faults. A process that is killed loses the seed that it was running.
 
 Exit status: 4 if a run failed, 1 if none failed and the campaign is incomplete."
 )]
@@ -41,9 +50,9 @@ pub(crate) struct Arguments {
     /// Cluster file
     #[arg(value_name = "CLUSTER.toml", required = true)]
     cluster: Option<PathBuf>,
-    /// Number of runs of the whole campaign
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
-    runs: u64,
+    /// Number of runs of the whole campaign; default: 1000. With --forever, of each seed; default: runs for about a minute on one processor
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
+    runs: Option<u64>,
     /// Seed of all random numbers; the default is taken from the clock and printed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     seed: Option<u64>,
@@ -65,6 +74,12 @@ pub(crate) struct Arguments {
     /// Run only part K of N of this seed; `merge` combines the parts
     #[arg(long, value_name = "K/N", default_value = "1/1", requires = "seed")]
     shard: Shard,
+    /// Run seeds that have no findings in this folder, without end; any number of processes share it
+    #[arg(long, value_name = "STORE", conflicts_with_all = ["seed", "shard"])]
+    forever: Option<PathBuf>,
+    /// Seeds 0 to N-1 only: the campaign ends when all of them are in the store
+    #[arg(long, value_name = "N", requires = "forever", value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: Option<u64>,
     /// The spares of the cluster wake when a station has been flagged for N cycles, and retire when the cluster has been complete for as many;
     /// without it they do not wake
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -78,14 +93,14 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Merge {
-    /// Combine the shards of a campaign
+    /// Combine the shards of a campaign, or stores of one campaign
     #[command(after_help = "\
 Example:
   understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 1/2 --out shard-1
   understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 2/2 --out shard-2
   understudy campaign merge shard-* --out campaign")]
     Merge {
-        /// Directories of the shards
+        /// Directories of the shards, or stores
         #[arg(value_name = "DIR", required = true)]
         shards: Vec<PathBuf>,
         /// Directory for the findings; without it they are only printed
@@ -140,7 +155,10 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
     kinds.sort_unstable();
     kinds.dedup();
     let plan = InjectionPlan {
-        runs: arguments.runs,
+        runs: arguments.runs.unwrap_or_else(|| match arguments.forever {
+            Some(_) => Store::usual_runs(&cluster, arguments.cycles),
+            None => USUAL_RUNS,
+        }),
         seed: arguments.seed.unwrap_or_else(seed_of_the_clock),
         cycles: arguments.cycles,
         property: match arguments.property {
@@ -153,8 +171,11 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
         shard: arguments.shard,
         spare_after: arguments.spare_after,
     };
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = arguments.jobs.map_or(processors, usize::from);
+    if let Some(folder) = &arguments.forever {
+        let answer = store::run(arguments, &cluster, folder, &plan, console)?;
+        return Ok(answer.with_used(reports));
+    }
+    let threads = threads(arguments);
     let bar = console.bar(plan.shard.share(plan.runs), "run {pos} of {len}, {eta} left");
     let interrupted = interruption()?;
     let start = Instant::now();
@@ -190,7 +211,16 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
     Ok(answer)
 }
 
+/// Number of threads that make runs.
+fn threads(arguments: &Arguments) -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    arguments.jobs.map_or(processors, usize::from)
+}
+
 fn merged(shards: &[PathBuf], out: Option<&Path>) -> Result<Answer, Answer> {
+    if shards.iter().any(|folder| Store::is_in(folder)) {
+        return kept(&store::merged(shards)?, out);
+    }
     let mut read = Vec::new();
     let mut failures = Vec::new();
     for folder in shards {

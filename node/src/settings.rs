@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use understudy_cycle::{Agreement, OnlineChange, Participant, Program, Versions};
 use understudy_executable::Executable;
-use understudy_wire::{ConfigurationHash, Epoch, ProgramId, StationId};
+use understudy_wire::{ConfigurationHash, Moment, ProgramId, StationId};
 
 use crate::event::Event;
 
@@ -20,9 +20,9 @@ pub struct Settings {
     /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. Absent in the other mode, and where a
     /// program has numbers, for which there is no circuit: then the parity word is the sum of the outputs of its replicas (9).
     pub generated: Option<Arc<Executable>>,
-    /// Epoch that it founds when it receives no other member: later than any earlier one of the cluster, such as the
+    /// First moment of the epoch that it founds when it receives no other member: later than any earlier one of the cluster, such as that of the
     /// wall clock at its start.
-    pub epoch: Epoch,
+    pub founds: Moment,
 }
 
 impl Settings {

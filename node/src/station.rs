@@ -12,6 +12,7 @@
 //! *Synchronised or silent*). Each remote I/O decides by itself which outputs it applies (*No election*).
 
 mod cycle_master;
+mod machine;
 mod relay;
 mod repair;
 #[cfg(test)]
@@ -23,9 +24,7 @@ use std::sync::Arc;
 pub use turn::STATES_EVERY;
 
 use smallvec::SmallVec;
-use understudy_cycle::{
-    Arrival, ChangeOrder, Input, Machine, OnlineChange, Output, Outvoted, Participant,
-};
+use understudy_cycle::{Arrival, ChangeOrder, OnlineChange, Output, Participant};
 use understudy_executable::Scratch;
 use understudy_wire::{
     Body, Configurations, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramHash,
@@ -37,7 +36,7 @@ use crate::event::Event;
 use crate::replica::{Followed, Replica, Standing};
 use crate::settings::Settings;
 
-/// One controller or understudy. See [`Machine`] for how it is driven.
+/// One controller or understudy. See [`understudy_cycle::Machine`] for how it is driven.
 #[derive(Debug, Clone)]
 pub struct Station {
     settings: Settings,
@@ -464,36 +463,5 @@ impl Hash for Station {
         (member, replicas).hash(hasher);
         (cycle, closed, company, started, role, wanted).hash(hasher);
         (joining, differed, lacked, awaited).hash(hasher);
-    }
-}
-
-impl Machine for Station {
-    type Event = Event;
-
-    fn handle_input(&mut self, now: Time, input: Input<'_>) {
-        self.member.note_time(now);
-        match input {
-            Input::Wakeup => self.wake(now),
-            Input::Frame(frame) => self.receive(now, frame),
-            Input::Change(order) => self.take_change(now, order),
-            Input::RemoteIo(_) => {}
-        }
-        self.member.wake_at(self.next_wakeup());
-    }
-
-    fn poll_output(&mut self) -> Option<Output<Event>> {
-        self.member.poll_output()
-    }
-
-    fn wakeup(&self) -> Time {
-        self.member.wakeup()
-    }
-
-    fn configurations(&self) -> Option<Configurations> {
-        Some(self.configurations())
-    }
-
-    fn outvoted(&self) -> Option<Outvoted> {
-        self.member.outvoted()
     }
 }

@@ -475,6 +475,10 @@ impl Machine for RemoteIo {
         self.member.outvoted()
     }
 
+    fn turn_window(&self) -> Time {
+        self.member.turn_window()
+    }
+
     /// The turns of a cycle count at its deadline; between cycles a frame may start the next one.
     fn patience(&self) -> Duration {
         match self.deadline {

@@ -31,6 +31,7 @@ mod rehearsal;
 mod reliability;
 mod requirements;
 mod scan;
+mod searches;
 mod terminal;
 mod twincat;
 mod verdicts;

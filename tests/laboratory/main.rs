@@ -15,7 +15,9 @@ mod drafts;
 mod field;
 mod gates;
 mod handshake;
+
 mod hosts;
+mod last_numbers;
 mod power;
 mod program_change;
 mod set_inputs;

@@ -13,7 +13,8 @@ mod merge;
 mod minimise;
 mod picture;
 mod property;
-mod shard;
+mod seeds;
+mod store;
 mod trial;
 
 use std::ops::Range;
@@ -24,15 +25,16 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
-use understudy_simulator::NotReady;
+use understudy_simulator::{NotReady, Shard};
 
 pub use coverage::CoverageRow;
 pub use findings::{Deadlines, Failure, Findings, FindingsError};
 pub use kind::{Kind, Phase, Role};
-pub use merge::{MergeError, merge};
+pub use merge::merge;
 pub use picture::{PictureError, picture};
 pub use property::Property;
-pub use shard::{NoShard, Shard};
+pub use seeds::Seeds;
+pub use store::{Store, StoreError};
 
 use coverage::Coverage;
 use draw::{Target, draw};
@@ -147,7 +149,7 @@ fn count_runs(
     loop {
         // Runs are begun in ascending order and finished once begun: what is done is always a range from the first one on.
         let place = next.fetch_add(1, Ordering::Relaxed);
-        let Some(run) = plan.shard.run(place, plan.runs) else {
+        let Some(run) = plan.shard.item(place, plan.runs) else {
             return count;
         };
         let (faultload, seed) = plan.draw(target, run);

@@ -15,11 +15,11 @@ pub use campaign::{
 };
 pub use injection::{
     CoverageRow, Deadlines, Failure, Findings, FindingsError, InjectionPlan, Kind,
-    MAXIMUM_FAILURES, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, MergeError, NoShard, Phase,
-    PictureError, Property, Role, Shard, inject, merge, picture,
+    MAXIMUM_FAILURES, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, Phase, PictureError, Property, Role,
+    Seeds, Store, StoreError, inject, merge, picture,
 };
 pub use observed::{JournalView, ObservationError, observe_journal};
 pub use outlook::{JournalOutlook, look_ahead};
 
-/// When spares wake and retire in a simulated plant.
-pub use understudy_simulator::SpareTimes;
+/// When spares wake and retire in a simulated plant, and the parts of a search.
+pub use understudy_simulator::{NoShard, Shard, ShardError, SpareTimes};

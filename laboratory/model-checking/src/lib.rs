@@ -22,4 +22,6 @@ pub use checker::{Counterexample, Verdict, check};
 pub use properties::{ALL, Promise, Property};
 pub use start::{Changed, Start};
 pub use step::{Budget, Step};
+/// A part of all runs, and what keeps parts from being all of them.
+pub use understudy_simulator::{Shard, ShardError};
 pub use world::{Model, World};

@@ -95,6 +95,11 @@ impl Place {
         SLOTS[self.slot]
     }
 
+    /// Number of slots since the first slot of cycle 0.
+    pub(crate) fn number(self) -> u64 {
+        self.cycle * SLOTS.len() as u64 + self.slot as u64
+    }
+
     pub(crate) fn next(self) -> Self {
         let slot = (self.slot + 1) % SLOTS.len();
         let cycle = self.cycle + u64::from(slot == 0);

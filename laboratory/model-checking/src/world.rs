@@ -5,12 +5,15 @@ use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, Hash, Hasher};
 use std::time::Duration;
 
 use stateright::Property as Checked;
-use understudy_simulator::{Fault, Network, NotReady, Parts, Simulation};
+use understudy_simulator::{Fault, Network, NotReady, Parts, Shard, Simulation};
 use understudy_wire::{Member, ProgramId, StationId, StationSet};
 
 use crate::properties::{Property, RECOVERY_CYCLES};
 use crate::start::Start;
 use crate::step::{Budget, LATE_PER_MILLE, Place, Step, faults, revivals};
+
+/// A prime above the number of faults that can be done at one place, so that the shards share those of each place.
+const FIRST_FAULTS_OF_A_PLACE: u64 = 1009;
 
 /// Cycles that the undisturbed cluster gets to come into step.
 const PATIENCE_CYCLES: u64 = 200;
@@ -26,6 +29,8 @@ pub struct Model {
     period: Duration,
     pub(crate) budget: Budget,
     properties: Vec<Property>,
+    /// The first faults that are tried.
+    shard: Shard,
 }
 
 /// A cluster between two slots.
@@ -62,7 +67,15 @@ impl Model {
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         let properties = start.properties();
-        Ok(Self { origin, start, members, slots, period, budget, properties })
+        let shard = Shard::WHOLE;
+        Ok(Self { origin, start, members, slots, period, budget, properties, shard })
+    }
+
+    /// The part of the model whose runs begin with every N-th fault that can be the first one. All shards together have all runs; the runs without
+    /// any fault are in each.
+    #[must_use]
+    pub fn of_shard(self, shard: Shard) -> Self {
+        Self { shard, ..self }
     }
 
     /// On which each frame takes T/20, and nothing is left to chance.
@@ -197,6 +210,7 @@ impl stateright::Model for Model {
             steps.push(if crashed { Step::Restart(member) } else { Step::Continue(member) });
         }
         steps.extend(world.cut.map(|side| Step::Heal { side }));
+        let before_faults = steps.len();
         if used.total < budget.total {
             let senders = self.senders(world);
             for &from in &senders {
@@ -232,6 +246,12 @@ impl stateright::Model for Model {
                     steps.push(Step::Stop(member));
                 }
             }
+        }
+        if used.total == 0 {
+            let first = world.place.number().wrapping_mul(FIRST_FAULTS_OF_A_PLACE);
+            let faults = steps.split_off(before_faults).into_iter().enumerate();
+            let own = faults.filter(|(index, _)| self.shard.has(first.wrapping_add(*index as u64)));
+            steps.extend(own.map(|(_, step)| step));
         }
         steps.retain(|&step| world.last.is_none_or(|last| step > last));
         steps.push(Step::Wait);

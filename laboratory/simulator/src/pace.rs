@@ -2,7 +2,12 @@
 
 use std::time::Duration;
 
-use understudy_wire::{Moment, Time};
+use understudy_wire::{Epoch, Moment, Time};
+
+/// First moment of the epoch that is founded as the `count`-th one of a run; `base` is that of the settings.
+pub(crate) fn founds(base: Moment, count: u64) -> Moment {
+    Moment { epoch: Epoch(base.epoch.0.saturating_add(count)), ..base }
+}
 
 /// Counts the cycles of a run. A period without any cycle, because nobody is there to pace, counts as one.
 #[derive(Debug, Clone, Hash)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use understudy_cluster::Cluster;
 use understudy_cycle::OnlineChange;
 use understudy_plant::{Followed, Plant};
-use understudy_wire::{Configurations, Epoch, Member, ProgramId, Roster, StationId};
+use understudy_wire::{Configurations, Member, Moment, ProgramId, Roster, StationId};
 
 /// The settings of every member. Remote I/Os and plants are indexed by program.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ pub fn parts(cluster: &Cluster) -> Parts {
     let programs = (0..cluster.controllers().len()).map(|index| ProgramId(index as u8));
     Parts {
         stations: stations
-            .filter_map(|rank| cluster.station_settings(StationId(rank as u8), Epoch::default()))
+            .filter_map(|rank| cluster.station_settings(StationId(rank as u8), Moment::default()))
             .collect(),
         remote_ios: programs.filter_map(|program| cluster.remote_io_settings(program)).collect(),
         plants: cluster

@@ -18,8 +18,8 @@ use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Audience, Configurations, Epoch, Field, Frame, Header, Member, ProgramId, ProgramSet,
-    StationId, StationSet, Time, Write,
+    Audience, Configurations, Field, Frame, Header, Member, ProgramId, ProgramSet, StationId,
+    StationSet, Time, Write,
 };
 
 use crate::disk::Disks;
@@ -27,7 +27,7 @@ use crate::fault::Fault;
 use crate::field::Plants;
 use crate::links::{Links, Metered};
 use crate::network::{Disturbance, Network};
-use crate::pace::Pace;
+use crate::pace::{Pace, founds};
 use crate::parts::Parts;
 use crate::queue::Delivery;
 use crate::referee::{Referee, Violation};
@@ -130,7 +130,7 @@ impl Simulation {
         let disks = Disks::new(parts.stations.len(), parts.remote_ios.len());
         let stations = parts.stations.iter().enumerate().map(|(rank, settings)| {
             let mut settings = settings.clone();
-            settings.epoch = Epoch(1 + rank as u64);
+            settings.founds = founds(parts.stations[0].founds, 1 + rank as u64);
             let slots = settings.agreement.schedule.spare_slots();
             let mut slot = Slot::new(disks.station(now, settings, parts.change.as_ref()));
             if slots.contains(StationId(rank as u8)) {
@@ -470,23 +470,6 @@ impl Simulation {
                 Output::Retain(record) => self.disks.write(member, record),
                 // The event says the same.
                 Output::Answer(_) | Output::Obeyed(_) => {}
-            }
-        }
-    }
-
-    fn poll_remote_io(&mut self, member: Member) -> Option<Output<understudy_remote_io::Event>> {
-        self.remote_io_slot(member)?.machine()?.poll_output()
-    }
-
-    fn show_field(&mut self, program: ProgramId) {
-        if let Some(field) = self.plants.field(program) {
-            let slot = &mut self.remote_ios[program.index()];
-            let sensors = RemoteIoInput::Field(&field.sensors);
-            slot.give(self.now, Input::RemoteIo(sensors));
-            self.wakeups.set(Member::RemoteIo(program), slot.due());
-            if let Some(twin) = &mut self.twins[program.index()] {
-                twin.give(self.now, Input::RemoteIo(sensors));
-                self.wakeups.set(Member::Twin(program), twin.due());
             }
         }
     }

@@ -106,7 +106,7 @@ impl Station {
         // now.
         let schedule = &self.settings.agreement.schedule;
         let anchor = if now.since(planned) < schedule.guard() { planned } else { now };
-        let moment = self.member.clock.pace(now, self.settings.epoch, anchor, schedule.period());
+        let moment = self.member.clock.pace(now, self.settings.founds, anchor, schedule.period());
         if self.role != Role::CycleMaster {
             self.role = Role::CycleMaster;
             self.report(Event::BecameCycleMaster { moment });

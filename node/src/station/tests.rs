@@ -96,7 +96,7 @@ fn settings(rank: u8, shadow_cycles: u32, turns: Turns) -> Settings {
         agreement: Arc::new(agreement),
         programs: programs.collect(),
         generated: None,
-        epoch: Epoch(9),
+        founds: Moment { epoch: Epoch(9), ..Moment::default() },
     }
 }
 

@@ -15,7 +15,7 @@ use understudy_wire::{Epoch, Moment, ProgramId};
 #[serde(from = "Written", into = "Written")]
 pub struct Numbering {
     /// For each epoch: what has to be added to its cycles.
-    offsets: BTreeMap<Epoch, i64>,
+    offsets: BTreeMap<Epoch, i128>,
     /// The newest cycle that was started.
     newest: Option<(Moment, i64)>,
     remote_ios: BTreeMap<ProgramId, Last>,
@@ -32,7 +32,7 @@ struct Last {
 /// The same as it is written: JSON has no numbers as keys.
 #[derive(Serialize, Deserialize)]
 struct Written {
-    epochs: Vec<(Epoch, i64)>,
+    epochs: Vec<(Epoch, i128)>,
     newest: Option<(Moment, i64)>,
     remote_ios: Vec<(ProgramId, Last)>,
 }
@@ -56,7 +56,7 @@ impl From<Written> for Numbering {
             (program, last)
         });
         Self {
-            offsets: epochs.map(|(epoch, offset)| (epoch, bounded(offset))).collect(),
+            offsets: epochs.map(|(epoch, offset)| (epoch, bounded_offset(offset))).collect(),
             newest: written.newest.map(|(moment, number)| (moment, bounded(number))),
             remote_ios: remote_ios.collect(),
         }
@@ -68,7 +68,7 @@ impl Numbering {
     pub(crate) fn at(moment: Moment, number: i64) -> Self {
         let number = bounded(number);
         Self {
-            offsets: BTreeMap::from([(moment.epoch, number - cycle(moment))]),
+            offsets: BTreeMap::from([(moment.epoch, i128::from(number) - cycle(moment))]),
             newest: Some((moment, number)),
             remote_ios: BTreeMap::new(),
         }
@@ -92,7 +92,7 @@ impl Numbering {
     /// The number of a moment that others speak of; none for an epoch that no remote I/O has seen.
     pub fn of(&self, moment: Moment) -> Option<i64> {
         let offset = self.offsets.get(&moment.epoch)?;
-        Some(cycle(moment).saturating_add(*offset))
+        Some(number(cycle(moment).saturating_add(*offset)))
     }
 
     /// The last number that was given.
@@ -112,13 +112,15 @@ impl Numbering {
 
     fn start(&mut self, remote_io: ProgramId, moment: Moment) -> i64 {
         let Some((newest, newest_number)) = self.newest else {
-            self.offsets.insert(moment.epoch, 0);
-            self.newest = Some((moment, cycle(moment)));
-            return cycle(moment);
+            // A run begins with the numbers of the cluster, unless no viewer could count on from there.
+            let first = if moment.cycle.0 <= LARGEST_FIRST { number(cycle(moment)) } else { 0 };
+            self.offsets.insert(moment.epoch, i128::from(first) - cycle(moment));
+            self.newest = Some((moment, first));
+            return first;
         };
         if moment.epoch == newest.epoch {
             if moment > newest {
-                let idle = self.idle_of_all(newest_number);
+                let idle = i128::from(self.idle_of_all(newest_number));
                 let skipped = cycle(moment) - cycle(newest) - 1;
                 let offset = self.offsets.entry(moment.epoch).or_default();
                 *offset = offset.saturating_add((idle - skipped).max(0));
@@ -126,10 +128,11 @@ impl Numbering {
         } else {
             let next =
                 newest_number.saturating_add(self.idle_of_all(newest_number)).saturating_add(1);
+            let next = i128::from(next);
             let offset = self.offsets.entry(moment.epoch).or_insert(next - cycle(moment));
             // One that comes back to an epoch goes on counting from where it was.
             let own = self.remote_ios.get(&remote_io).map(|last| last.number);
-            if own.is_some_and(|own| cycle(moment).saturating_add(*offset) <= own) {
+            if own.is_some_and(|own| cycle(moment).saturating_add(*offset) <= i128::from(own)) {
                 *offset = next - cycle(moment);
             }
         }
@@ -154,13 +157,28 @@ impl Numbering {
 /// No cluster lives for so long; what says so is a journal that somebody has changed.
 const MAXIMUM: i64 = i64::MAX / 4;
 
+/// Largest number of a first cycle that a browser counts on from.
+const LARGEST_FIRST: u64 = 1 << 52;
+
 /// The same of a number that was read.
 fn bounded(number: i64) -> i64 {
     number.clamp(-MAXIMUM, MAXIMUM)
 }
 
-fn cycle(moment: Moment) -> i64 {
-    i64::try_from(moment.cycle.0).map_or(MAXIMUM, |cycle| cycle.min(MAXIMUM))
+fn cycle(moment: Moment) -> i128 {
+    i128::from(moment.cycle.0)
+}
+
+/// As near as a number can be.
+fn number(number: i128) -> i64 {
+    let bounded = number.clamp((-MAXIMUM).into(), MAXIMUM.into());
+    i64::try_from(bounded).unwrap_or(MAXIMUM)
+}
+
+/// An offset that was read: that of a number and a cycle.
+fn bounded_offset(offset: i128) -> i128 {
+    let largest = i128::from(MAXIMUM) + i128::from(u64::MAX);
+    offset.clamp(-largest, largest)
 }
 
 #[cfg(test)]

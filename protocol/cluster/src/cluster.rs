@@ -219,6 +219,7 @@ pub struct Cluster {
     pub(crate) name: String,
     pub(crate) link: Link,
     pub(crate) retain_every: Duration,
+    pub(crate) spins: bool,
     pub(crate) multicast: Option<SocketAddrV4>,
     pub(crate) has_two_networks: bool,
     pub(crate) security: Security,
@@ -250,6 +251,11 @@ impl Cluster {
     /// The first multicast group of its frames, where the network has multicast; only for UDP.
     pub fn multicast(&self) -> Option<SocketAddrV4> {
         self.multicast.filter(|_| self.link == Link::Udp)
+    }
+
+    /// Whether stations and remote I/Os wait actively within the turn window, where each has a core of its own.
+    pub fn spins(&self) -> bool {
+        self.spins
     }
 
     /// Whether each frame is sent over two networks.

@@ -65,6 +65,7 @@ pub(crate) struct ClusterSection {
     pub(crate) shadow_cycles: u32,
     pub(crate) listen_cycles: u32,
     pub(crate) retain_every: Duration,
+    pub(crate) spin: bool,
     /// Index into [`crate::format::LINKS`].
     pub(crate) link: usize,
     pub(crate) multicast: Option<SocketAddrV4>,
@@ -289,6 +290,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         shadow_cycles: fields.count("shadow_cycles", diagnostics),
         listen_cycles: fields.count("listen_cycles", diagnostics),
         retain_every: fields.time("retain_every", diagnostics),
+        spin: fields.flag("spin", diagnostics),
         link: fields.word("link", diagnostics),
         multicast: fields.multicast("multicast", diagnostics),
         networks,

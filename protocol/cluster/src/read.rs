@@ -228,6 +228,7 @@ fn build(
         name,
         link,
         retain_every: cluster.retain_every,
+        spins: cluster.spin,
         multicast: cluster.multicast,
         has_two_networks,
         security: overrides.security.unwrap_or([Security::Keys, Security::Off][cluster.security]),

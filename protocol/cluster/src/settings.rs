@@ -5,19 +5,20 @@ use std::sync::Arc;
 
 use understudy_cycle::Mode;
 use understudy_remote_io::{PairSettings, PointPlace, SignalSource};
-use understudy_wire::{Epoch, Member, ProgramId, StationId};
+use understudy_wire::{Member, Moment, ProgramId, StationId};
 
 use crate::cluster::{Cluster, RemoteIo};
 use crate::undriven::initial_image;
 
 impl Cluster {
-    /// What a station is told when it starts; `epoch` is the one that it starts when nobody is there.
+    /// What a station is told when it starts; `founds` is the first moment of the epoch that it founds when it receives no
+    /// other member.
     ///
     /// Nothing where the cluster has no such station.
     pub fn station_settings(
         &self,
         station: StationId,
-        epoch: Epoch,
+        founds: Moment,
     ) -> Option<understudy_node::Settings> {
         self.member_name(Member::Station(station))?;
         let evaluates_generated =
@@ -31,7 +32,7 @@ impl Cluster {
                 .as_ref()
                 .filter(|_| evaluates_generated)
                 .map(|parity| Arc::new(parity.circuit().into())),
-            epoch,
+            founds,
         })
     }
 

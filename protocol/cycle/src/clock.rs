@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use understudy_wire::{Body, Epoch, Frame, Moment, Time};
+use understudy_wire::{Body, Frame, Moment, Time};
 
 /// The current cycle of one member.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
@@ -94,12 +94,9 @@ impl CycleClock {
         self.founder = false;
     }
 
-    /// Starts the next cycle of the epoch at `now`, or a new epoch where there is none yet, as the cycle master does.
-    pub fn pace(&mut self, now: Time, founded: Epoch, anchor: Time, period: Duration) -> Moment {
-        let next = match self.moment {
-            Some(moment) => moment.plus(1),
-            None => Moment { epoch: founded, ..Moment::default() },
-        };
+    /// Starts the next cycle at `now`, or the first one of a new epoch where there is none yet, as the cycle master does.
+    pub fn pace(&mut self, now: Time, founds: Moment, anchor: Time, period: Duration) -> Moment {
+        let next = self.moment.map_or(founds, |moment| moment.plus(1));
         self.look_around(now, period);
         self.moment = Some(next);
         self.anchor = anchor;

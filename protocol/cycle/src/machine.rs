@@ -107,6 +107,11 @@ pub trait Machine {
         None
     }
 
+    /// End of the turn window of the current cycle, in which a member with a core of its own waits actively; a time that has passed where there is none.
+    fn turn_window(&self) -> Time {
+        Time::default()
+    }
+
     /// How long a frame that arrives now may wait for others, so that they are taken together; never past [`Self::wakeup`], before which all that
     /// has arrived is taken.
     fn patience(&self) -> Duration {

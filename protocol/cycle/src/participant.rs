@@ -368,6 +368,11 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         self.waking.ask(at);
     }
 
+    /// End of the turn window of the current cycle: the deadline of the remote I/Os.
+    pub fn turn_window(&self) -> Time {
+        self.clock.anchor() + self.endpoint.agreement.schedule.deadline()
+    }
+
     /// Time at which it asked to be woken.
     pub fn wakeup(&self) -> Time {
         self.waking.asked()

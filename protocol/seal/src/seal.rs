@@ -17,6 +17,12 @@ pub enum SealError {
         /// Station that asked.
         to: StationId,
     },
+    /// All numbers of this life are used: only a further life can seal.
+    #[error("all frames of life {life} are numbered")]
+    Exhausted {
+        /// The life.
+        life: u32,
+    },
     /// A frame of another member: an error in this program.
     #[error("a frame of {sender:?} cannot be sealed by {own:?}")]
     NotOwn {
@@ -26,6 +32,12 @@ pub enum SealError {
         sender: Member,
     },
 }
+
+/// Frames before the end of the numbers of a life at which a further life is asked for.
+const RESERVE: u64 = 1 << 20;
+
+/// Frames between two requests for a further life.
+const ASKED_EVERY: u64 = 1 << 12;
 
 /// Seals the frames of one member in one life.
 pub struct Seal {
@@ -47,6 +59,19 @@ impl Seal {
     ) -> Self {
         let ciphers = transfers.into_iter().map(|(to, key)| (to, key.cipher()));
         Self { own, key, transfers: ciphers.collect(), life, number: 0 }
+    }
+
+    /// The same after the frame with this number: the next one has the next number.
+    #[must_use]
+    pub fn after(self, number: u64) -> Self {
+        Self { number, ..self }
+    }
+
+    /// Whether it is time to ask for a further life: from [`RESERVE`] frames before the end on, at intervals, so that a life that cannot begin is not
+    /// asked for with every frame.
+    pub fn needs_life(&self) -> bool {
+        let left = u64::MAX - self.number;
+        left <= RESERVE && left.is_multiple_of(ASKED_EVERY)
     }
 
     /// Life in which it seals.
@@ -81,7 +106,7 @@ impl Seal {
             }
             None => None,
         };
-        self.number += 1;
+        self.number = self.number.checked_add(1).ok_or(SealError::Exhausted { life: self.life })?;
         let envelope = Envelope { sender, to, life: self.life, number: self.number };
         let header = envelope.to_bytes();
         datagram.extend_from_slice(&header);

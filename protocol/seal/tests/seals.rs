@@ -204,6 +204,29 @@ fn a_later_life_of_another_configuration_shuts_nobody_out() {
 }
 
 /// What was on its way when a member started again is late; what its earlier life goes on to say is not.
+/// The last frames of a life are opened like all others; then nothing is sealed until a further life, which is asked for in time.
+#[test]
+fn numbers_of_a_life_end() {
+    let mut listener = listener();
+    let mut last = seal(ROBOT, 7).after(u64::MAX - 3);
+    for cycle in 0..3 {
+        let datagram = sealed(&mut last, &frame(ROBOT, cycle));
+        assert!(open(&mut listener, &datagram).is_ok_and(|found| found.is_some()));
+        assert!(open(&mut listener, &datagram).is_err(), "a frame counts once");
+    }
+    let mut datagram = vec![1];
+    let refused = last.seal(&frame(ROBOT, 3), &[], &mut datagram);
+    assert_eq!((refused, datagram.len()), (Err(SealError::Exhausted { life: 7 }), 0));
+    let mut next = seal(ROBOT, 8);
+    let datagram = sealed(&mut next, &frame(ROBOT, 4));
+    assert!(open(&mut listener, &datagram).is_ok_and(|found| found.is_some()));
+
+    let asks = |number: u64| seal(ROBOT, 7).after(number).needs_life();
+    assert!(!asks(0) && !asks(u64::MAX / 2));
+    let near = (u64::MAX - 20_000..=u64::MAX).filter(|number| asks(*number)).count();
+    assert_eq!(near, 5, "at intervals, and once more when no number is left");
+}
+
 #[test]
 fn two_lives_at_once_are_told_from_late_frames() {
     let mut opener = listener();

@@ -94,10 +94,26 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// The moment `cycles` later in the same epoch, at most the last cycle that can be numbered.
+    /// The last moment: no moment follows it.
+    pub const LAST: Self = Self { epoch: Epoch(u64::MAX), cycle: Cycle(u64::MAX) };
+
+    /// The moment `cycles` later: the next epoch follows the last cycle that can be numbered, and [`Moment::LAST`] follows itself.
     #[must_use]
     pub fn plus(self, cycles: u64) -> Self {
-        Self { epoch: self.epoch, cycle: Cycle(self.cycle.0.saturating_add(cycles)) }
+        let left = u64::MAX - self.cycle.0;
+        match cycles.checked_sub(left) {
+            None | Some(0) => Self { epoch: self.epoch, cycle: Cycle(self.cycle.0 + cycles) },
+            Some(over) => match self.epoch.0.checked_add(1) {
+                Some(epoch) => Self { epoch: Epoch(epoch), cycle: Cycle(over - 1) },
+                None => Self::LAST,
+            },
+        }
+    }
+
+    /// The first moment of the next epoch, [`Moment::LAST`] if there is no other epoch.
+    #[must_use]
+    pub fn next_epoch(self) -> Self {
+        Self { epoch: self.epoch, cycle: Cycle(u64::MAX) }.plus(1)
     }
 }
 
@@ -138,4 +154,32 @@ hashes! {
     ProgramHash;
     /// Identifies the authority that issued the keys of a member, by its certificate.
     AuthorityHash;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_count_on_into_the_next_epoch() {
+        let at = |epoch, cycle| Moment { epoch: Epoch(epoch), cycle: Cycle(cycle) };
+        let end = u64::MAX;
+        let check = |from: Moment, cycles: u64, expected: Moment| {
+            assert_eq!(from.plus(cycles), expected, "{from} plus {cycles}");
+            assert!(from <= expected);
+        };
+        check(at(3, 0), 0, at(3, 0));
+        check(at(3, 5), 2, at(3, 7));
+        check(at(3, end - 1), 1, at(3, end));
+        check(at(3, end), 0, at(3, end));
+        check(at(3, end), 1, at(4, 0));
+        check(at(3, end - 1), 4, at(4, 2));
+        check(at(3, end), end, at(4, end - 1));
+        check(at(end, end - 1), 1, Moment::LAST);
+        check(at(end, end - 1), 2, Moment::LAST);
+        check(Moment::LAST, 1, Moment::LAST);
+        check(at(end, 7), end, Moment::LAST);
+        assert_eq!(at(3, 9).next_epoch(), at(4, 0));
+        assert_eq!(at(end, 9).next_epoch(), Moment::LAST);
+    }
 }

@@ -90,7 +90,9 @@ impl Writing {
         let is_same = session.value.is_none_or(|value| value == write.value)
             && session.input.is_none_or(|input| inputs[input].place.bit == write.input);
         Some(match session.progress {
-            _ if !is_same => Err(WriteRefusal::Order { expected: write.id.number + 1 }),
+            _ if !is_same => {
+                Err(WriteRefusal::Order { expected: write.id.number.saturating_add(1) })
+            }
             Progress::InEffect { since } => Ok(Taking::InEffect(since)),
             Progress::Taken | Progress::Sampled { .. } => Ok(Taking::Pending),
         })

@@ -40,7 +40,7 @@ pub enum Health {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What: `clock`, `scheduler`, `memory`, `descriptors`, `processors`, `sockets`, `ports`, `networks`, `keys`, `configuration` or `peer`.
+    /// What: `clock`, `scheduler`, `memory`, `descriptors`, `processors`, `cores`, `sockets`, `ports`, `networks`, `keys`, `configuration` or `peer`.
     pub check: &'static str,
     /// How it stands.
     pub health: Health,

@@ -127,14 +127,17 @@ impl Guard {
         frame: &Frame,
         encoded: &'b [u8],
     ) -> Result<&'b [u8], String> {
-        match self {
-            Self::Off => Ok(encoded),
-            Self::Keys(keys) => {
-                let sealed = keys.seal.seal(frame, encoded, &mut keys.datagram);
-                sealed.map_err(|error| error.to_string())?;
-                Ok(&keys.datagram)
+        if let Self::Keys(keys) = self {
+            let sealed = keys.seal.seal(frame, encoded, &mut keys.datagram);
+            sealed.map_err(|error| error.to_string())?;
+            if keys.seal.needs_life() {
+                self.ask_for_life();
             }
         }
+        Ok(match self {
+            Self::Off => encoded,
+            Self::Keys(keys) => &keys.datagram,
+        })
     }
 
     /// What a datagram is that came over a network. Without keys a second copy is a frame like its first.

@@ -1,6 +1,7 @@
 //! The loop that runs one member on real time: drain what it says, sleep until something arrives or its time has come.
 //!
-//! Invariants: the loop never waits for anything but [`ppoll`]; it never spins; and between two looks at the member's own
+//! Invariants: the loop never waits for anything but [`ppoll`], which it asks again and again within the turn window where the member has a core of
+//! its own; and between two looks at the member's own
 //! times it takes [`INPUTS_IN_A_ROW`] datagrams at most, so that no flood keeps a member from its turn.
 
 mod reports;
@@ -84,6 +85,8 @@ pub struct Host<'a, M: Machine> {
     pub orders: &'a Orders,
     /// Its time.
     pub clock: Clock,
+    /// Whether it waits actively within the turn window.
+    pub spins: bool,
 }
 
 /// What the loop keeps from one round to the next.
@@ -439,6 +442,15 @@ impl<M: Machine> Host<'_, M> {
             PollFd::new(self.orders.readiness(), PollFlags::POLLIN),
             PollFd::new(self.link.readiness(), PollFlags::POLLIN),
         ];
+        let window = self.machine.turn_window().min(until);
+        if self.spins && now < window {
+            while !descriptors.iter().any(|it| it.any() == Some(true)) && self.clock.now() < window
+            {
+                std::hint::spin_loop();
+                poll_for(&mut descriptors, Duration::ZERO)?;
+            }
+            return Ok(());
+        }
         poll_for(&mut descriptors, until.since(now))?;
         let [orders, link] = &mut descriptors;
         let patience = self.machine.patience();

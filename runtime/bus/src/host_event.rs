@@ -116,12 +116,12 @@ pub enum HostEvent {
         /// Whose keys they had.
         member: Member,
     },
-    /// The others do not receive this member, so it goes on in a new life.
+    /// It goes on in a new life: the others do not receive it, or the numbers of its frames end.
     NewLife {
         /// Its number.
         life: u32,
     },
-    /// The others do not receive this member, and it cannot go on in a new life.
+    /// It cannot go on in a new life.
     NoNewLife {
         /// Why.
         reason: String,

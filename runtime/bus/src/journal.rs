@@ -295,7 +295,12 @@ mod tests {
                 process: 4711,
                 address: ([127, 0, 0, 1], 7450).into(),
                 link: LinkKind::Zenoh,
-                rights: Rights { real_time: true, locked_memory: true, lacking: Vec::new() },
+                rights: Rights {
+                    real_time: true,
+                    locked_memory: true,
+                    core: None,
+                    lacking: Vec::new(),
+                },
             })),
             record(Noted::Member(Event::BecameCycleMaster { cycle: 3 })),
             record(Noted::Host(HostEvent::JournalLost { records: 5 })),

@@ -11,6 +11,7 @@ mod channel;
 mod clock;
 mod connections;
 mod control;
+mod cores;
 mod distribution;
 pub mod doctor;
 mod documents;

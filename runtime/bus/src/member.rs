@@ -15,6 +15,7 @@ use crate::changes::Changes;
 use crate::channel::{Channel, ChannelSettings, DONE, followed};
 use crate::clock::Clock;
 use crate::control::{Commands, change_request, ending_signals, watch};
+use crate::cores::OwnCore;
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::field::FieldDriver;
@@ -56,6 +57,8 @@ pub struct MemberSettings {
     pub ends_with_parent: bool,
     /// Whether SCHED_FIFO and locked memory are asked for.
     pub real_time: bool,
+    /// Whether the member waits actively within the turn window, where it has a core of its own.
+    pub spin: bool,
 }
 
 /// Runs a member until it is told to stop by a command, by SIGINT or SIGTERM, or by the end of standard input.
@@ -89,6 +92,7 @@ where
         commands,
         ends_with_parent,
         real_time,
+        spin,
     } = settings;
     if ends_with_parent {
         end_with_parent()?;
@@ -121,6 +125,7 @@ where
     if real_time {
         rights.lock();
     }
+    let core = if spin { rights.claim_core() } else { None };
     let ready = HostEvent::Ready {
         version: JOURNAL_VERSION,
         process: std::process::id(),
@@ -169,6 +174,10 @@ where
                 let _finished = Finished(finished_here);
                 let _member = span.entered();
                 keep_times(raises);
+                let held = core.as_ref().map(OwnCore::hold);
+                if let Some(Err(error)) = &held {
+                    tracing::warn!(error, "U0511: the member waits without spinning");
+                }
                 Host {
                     machine: &mut machine,
                     link: link.as_mut(),
@@ -180,6 +189,7 @@ where
                     watchdog,
                     orders: &orders,
                     clock,
+                    spins: matches!(held, Some(Ok(()))),
                 }
                 .run()
             })

@@ -13,6 +13,8 @@ use thread_priority::{
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
+use crate::cores::OwnCore;
+
 /// Of SCHED_FIFO, for the thread of the cycle.
 pub(crate) const CYCLE_PRIORITY: u8 = 40;
 /// Of SCHED_FIFO, for the threads on which a link hears, which run only when there is something to carry.
@@ -35,6 +37,9 @@ pub struct Rights {
     pub real_time: bool,
     /// Whether its memory stays in memory.
     pub locked_memory: bool,
+    /// Core on which it waits actively (`spin = true`), where it has one for itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub core: Option<usize>,
     /// What is lacking, what it costs, and how to grant it; one sentence each.
     pub lacking: Vec<String>,
 }
@@ -56,7 +61,7 @@ impl Rights {
             }
         };
         LINK_IN_REAL_TIME.store(real_time, Ordering::Relaxed);
-        Self { real_time, locked_memory: false, lacking }
+        Self { real_time, locked_memory: false, core: None, lacking }
     }
 
     /// Locks the memory, once what the process needs is there.
@@ -69,11 +74,26 @@ impl Rights {
         }
     }
 
+    /// Claims a core for a member that is to wait actively; it waits as always where there is none.
+    pub(crate) fn claim_core(&mut self) -> Option<OwnCore> {
+        match OwnCore::claim() {
+            Ok(core) => {
+                self.core = Some(core.number);
+                Some(core)
+            }
+            Err(reason) => {
+                self.lacking.push(format!("U0511: `spin = true` has no core of its own: {reason}; the member waits without spinning"));
+                None
+            }
+        }
+    }
+
     /// None was asked for.
     pub(crate) fn unclaimed() -> Self {
         Self {
             real_time: false,
             locked_memory: false,
+            core: None,
             lacking: vec!["no real-time rights were asked for".into()],
         }
     }

@@ -123,6 +123,7 @@ fn member_with(
             commands: Commands::None,
             ends_with_parent: false,
             real_time: false,
+            spin: false,
         };
         run_member(Chatter::new(station(0), 1), settings, std::io::sink())
     })

@@ -93,6 +93,7 @@ impl Running {
                 watchdog: None,
                 orders: &orders,
                 clock: Clock::start(),
+                spins: false,
             }
             .run()
             .expect("it sleeps")

@@ -85,6 +85,7 @@ fn act(part: &Part) -> ExitCode {
         commands: if part.ends_with_input { Commands::ReadAndEndWithInput } else { Commands::Read },
         ends_with_parent: true,
         real_time: true,
+        spin: false,
     };
     match run_member(Chatter::new(part.own, part.life), settings, std::io::stdout()) {
         Ok(_) => ExitCode::SUCCESS,

@@ -64,6 +64,7 @@ fn start(
             watchdog: None,
             orders: &orders,
             clock: Clock::start(),
+            spins: false,
         }
         .run()
         .expect("it sleeps");

@@ -52,6 +52,11 @@ pub enum MemberError {
     /// The keys cannot be used.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Keys(Vec<KeysError>),
+    /// The first numbers of a test cannot be read.
+    #[error(
+        "invalid UNDERSTUDY_FIRST_NUMBERS `{0}`: expected EPOCH:CYCLE:FRAME, three whole numbers; only tests set it"
+    )]
+    FirstNumbers(String),
     /// The thread of a device cannot start.
     #[error("a thread for the device: {0}")]
     Device(io::Error),
@@ -79,6 +84,7 @@ impl MemberError {
             Self::WrongKind { .. } => "U0606",
             Self::List { .. } => "U0607",
             Self::NoAddress { .. } => "U0608",
+            Self::FirstNumbers(_) => "U0600",
             Self::NoKeys => "U0620",
             Self::Keys(errors) => errors.first().map_or("U0902", KeysError::code),
             Self::Device(_) => "U0506",

@@ -14,6 +14,7 @@ use understudy_keys::{Date, MemberKeys, RevocationWatch, TlsFiles};
 use understudy_wire::Member;
 
 use crate::error::MemberError;
+use crate::first_numbers::FirstNumbers;
 use crate::run::MemberOptions;
 
 /// What a member seals and opens with, and what follows its list of revoked keys.
@@ -44,7 +45,8 @@ pub(crate) fn read_keys(
     let keys = MemberKeys::load(folder, cluster, member, now);
     let keys = keys.map_err(MemberError::Keys)?;
     let keys = Arc::new(keys);
-    let seal = keys.begin_life(now);
+    let sealed = FirstNumbers::now()?.sealed;
+    let seal = keys.begin_life(now).map(|seal| seal.after(sealed));
     let watch = keys.watch();
     match (seal, watch) {
         (Ok(seal), Ok(watch)) => Ok(Held {

@@ -10,6 +10,7 @@
 mod changes;
 mod error;
 mod field;
+mod first_numbers;
 mod former;
 mod held;
 mod peers;

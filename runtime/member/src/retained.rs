@@ -9,7 +9,7 @@ use understudy_keys::authority_of;
 use understudy_node::Settings;
 use understudy_typed::{CarriedState, Fate};
 use understudy_wire::{
-    Carried, Digest, Epoch, Image, ProgramHash, ProgramId, RetainedProgram, RetainedRun,
+    Carried, Digest, Image, Moment, ProgramHash, ProgramId, RetainedProgram, RetainedRun,
     RetainedState,
 };
 
@@ -246,8 +246,9 @@ fn carried_over(program: &str, state: &CarriedState) -> CarriedOver {
 
 /// A station founds an epoch that is later than those of what it has kept, whatever its clock shows after the power failure.
 pub(crate) fn later_than_retained(mut settings: Settings, runs: &[RetainedRun]) -> Settings {
-    let newest = runs.iter().map(|run| run.stepped().epoch.0).max();
-    let after = newest.map_or(0, |newest| newest.saturating_add(1));
-    settings.epoch = Epoch(settings.epoch.0.max(after));
+    let newest = runs.iter().map(|run| run.stepped()).max();
+    if let Some(after) = newest.map(Moment::next_epoch) {
+        settings.founds = settings.founds.max(after);
+    }
     settings
 }

@@ -5,7 +5,6 @@ use std::net::SocketAddrV4;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::Command;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 use understudy_bus::{
@@ -18,11 +17,12 @@ use understudy_journal::Segments;
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Member, Time};
+use understudy_wire::{Member, Time};
 
 use crate::changes::{StartedChange, started_change};
 use crate::error::MemberError;
 use crate::field::Equipment;
+use crate::first_numbers::FirstNumbers;
 use crate::held::read_keys;
 use crate::peers::find_member;
 use crate::retained::{later_than_retained, retained_notes, retained_runs};
@@ -64,7 +64,7 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
     };
     let started = started_change(cluster, options);
     let cluster = &started.cluster.clone();
-    let settings = cluster.station_settings(station, epoch_of_the_clock());
+    let settings = cluster.station_settings(station, FirstNumbers::now()?.founds);
     let settings = settings.ok_or_else(wrong)?;
     let is_loaded = |program, hash| started.has_loaded(program, hash);
     let (runs, retention) = retained_runs(cluster, options, &settings, is_loaded);
@@ -195,6 +195,7 @@ where
         },
         ends_with_parent: options.ends_with_parent,
         real_time: options.real_time,
+        spin: cluster.spins() && options.real_time,
     };
     let output: Box<dyn io::Write + Send> = match &options.journal {
         None => Box::new(io::stdout()),
@@ -230,10 +231,4 @@ pub fn restart_for_zenoh((variable, value): (&str, &str)) {
         let error = Command::new(program).args(arguments).env(variable, value).exec();
         tracing::warn!(%error, "the program was not started again with fewer threads for Zenoh");
     }
-}
-
-/// Later than any epoch that the cluster has had.
-fn epoch_of_the_clock() -> Epoch {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    Epoch(since.map_or(1, |since| u64::try_from(since.as_micros()).unwrap_or(u64::MAX)))
 }

@@ -154,6 +154,7 @@ fn play_part(part: Part) -> Result<(), BusError> {
                 commands: Commands::ReadAndEndWithInput,
                 ends_with_parent: true,
                 real_time: settings.real_time,
+                spin: false,
             };
             let pattern = Pattern::new(own, settings.period, meter);
             understudy_bus::run_member(pattern, member_settings, io::stdout()).map(drop)

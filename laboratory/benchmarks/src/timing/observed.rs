@@ -201,6 +201,10 @@ impl<M: Machine> Machine for Observed<M> {
         self.machine.outvoted()
     }
 
+    fn turn_window(&self) -> Time {
+        self.machine.turn_window()
+    }
+
     fn patience(&self) -> Duration {
         self.machine.patience()
     }

@@ -18,7 +18,7 @@ use understudy_cluster::{Cluster, Overrides, press_cell, read_with_files};
 use understudy_cycle::Turns;
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Member, ProgramId, StationId, Time};
+use understudy_wire::{Epoch, Member, Moment, ProgramId, StationId, Time};
 
 use super::observed::{Measured, Observed, Window, stations_of_understudy};
 use crate::children::{Running, guard, refused};
@@ -38,6 +38,7 @@ pub(super) struct Case {
     pub(super) copies: u32,
     pub(super) measured_for: Duration,
     pub(super) real_time: bool,
+    pub(super) spin: bool,
 }
 
 impl Case {
@@ -208,6 +209,7 @@ fn play(part: Part) -> Result<(), Answer> {
         commands: Commands::ReadAndEndWithInput,
         ends_with_parent: true,
         real_time: case.real_time,
+        spin: case.spin,
     };
     let window = case.window();
     let missing = || Answer::failed(Status::BadInput, "U0607", format!("no member {own:?}"));
@@ -221,7 +223,8 @@ fn play(part: Part) -> Result<(), Answer> {
         Member::Station(station) => {
             let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
             let epoch = Epoch(since.as_micros() as u64);
-            let machine = cluster.station_settings(station, epoch).ok_or_else(missing)?;
+            let founds = Moment { epoch, ..Moment::default() };
+            let machine = cluster.station_settings(station, founds).ok_or_else(missing)?;
             let machine = Station::new(Time::default(), machine);
             let understudy = stations_of_understudy(own, case.controllers);
             let observed = Observed::new(machine, own, understudy, window);

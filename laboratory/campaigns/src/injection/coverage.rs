@@ -46,14 +46,7 @@ impl Coverage {
         let Some(disturbance) = &faultload.network else {
             return;
         };
-        let network = &disturbance.network;
-        let there = [
-            (Kind::Loss, network.loss > 0.0),
-            (Kind::Duplication, network.duplicate > 0.0),
-            (Kind::Jitter, !network.jitter.is_zero()),
-            (Kind::Corruption, network.corruption > 0.0),
-        ];
-        for (kind, _) in there.into_iter().filter(|(_, there)| *there) {
+        for kind in Kind::of_network(&disturbance.network) {
             if let Some(row) = self.row(kind, Role::Network) {
                 row.counts.iter_mut().for_each(|count| *count += 1);
             }

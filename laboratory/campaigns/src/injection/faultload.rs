@@ -75,6 +75,17 @@ impl Faultload {
         steps
     }
 
+    /// Kinds of the faults, ascending.
+    pub(super) fn kinds(&self) -> Vec<Kind> {
+        let injected = self.injections.iter().map(|injection| injection.kind);
+        let disturbed =
+            self.network.iter().flat_map(|disturbance| Kind::of_network(&disturbance.network));
+        let mut kinds: Vec<Kind> = injected.chain(disturbed).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        kinds
+    }
+
     /// The same as a scenario for people, with the seed that its run has.
     pub(super) fn scenario(
         &self,

@@ -9,13 +9,14 @@ use understudy_journal::Members;
 use understudy_scenarios::write;
 use understudy_simulator::Tally;
 
-use super::coverage::CoverageRow;
-use super::kind::Phase;
+use super::coverage::{Coverage, CoverageRow};
+use super::kind::{Kind, Phase};
 use super::minimise::Violating;
+use super::seeds::Seeds;
 use super::{Count, InjectionPlan};
 
 /// Version of `campaign.json`.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Failures that are listed for people, at most.
 const LISTED_FAILURES: usize = 20;
@@ -23,7 +24,7 @@ const LISTED_FAILURES: usize = 20;
 /// The whole of `campaign.json`. It holds no time and no name of a machine: equal campaigns have equal findings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// Of this format: 1.
+    /// Of this format: 2.
     pub format: u32,
     /// The cluster's name.
     pub cluster: String,
@@ -31,9 +32,11 @@ pub struct Findings {
     pub configuration: String,
     /// `full` or `paper`.
     pub mode: String,
-    /// What was asked for.
+    /// What was asked for; of several seeds, the plan of each, with the seed 0.
     pub plan: InjectionPlan,
-    /// Runs that the shard asked for; fewer were made where the time ran out.
+    /// Seeds of which runs were made.
+    pub seeds: Seeds,
+    /// Runs that the shard or the seeds asked for; fewer were made where the time ran out.
     pub runs_asked: u64,
     /// Runs that were made.
     pub runs_made: u64,
@@ -43,7 +46,8 @@ pub struct Findings {
     pub deadlines: Deadlines,
     /// Kind × role × phase of what was injected.
     pub coverage: Vec<CoverageRow>,
-    /// The failed runs with the lowest numbers, each made small; at most [`super::MAXIMUM_FAILURES`].
+    /// Failed runs, each made small. Of one seed those with the lowest numbers, at most [`super::MAXIMUM_FAILURES`]; of a store the smallest and the
+    /// fastest one for each set of kinds of faults.
     pub failures: Vec<Failure>,
 }
 
@@ -79,8 +83,12 @@ impl Deadlines {
 /// A run in which the property did not hold.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
+    /// Seed of the campaign.
+    pub campaign_seed: u64,
     /// Its number in the campaign.
     pub run: u64,
+    /// Kinds of the faults that are enough, ascending.
+    pub kinds: Vec<Kind>,
     /// Faults that were drawn for it.
     pub faults_drawn: usize,
     /// Faults that are enough.
@@ -120,7 +128,9 @@ impl Failure {
             ),
         ];
         Self {
+            campaign_seed: plan.seed,
             run,
+            kinds: small.faultload.kinds(),
             faults_drawn,
             faults: small.faultload.size().0,
             cycles: small.cycles,
@@ -134,7 +144,7 @@ impl Failure {
 
     /// The name of its scenario file.
     pub fn file_name(&self) -> String {
-        format!("run-{}.toml", self.run)
+        format!("seed-{}-run-{}.toml", self.campaign_seed, self.run)
     }
 }
 
@@ -170,6 +180,7 @@ impl Findings {
             }
             .to_owned(),
             plan: plan.clone(),
+            seeds: Seeds::range(plan.seed, plan.seed),
             runs_asked: plan.shard.share(plan.runs),
             runs_made: count.runs,
             runs_failed: count.failed,
@@ -177,6 +188,34 @@ impl Findings {
             coverage: count.coverage.into_rows(),
             failures,
         }
+    }
+
+    /// The same without any run.
+    pub(super) fn emptied(&self) -> Self {
+        Self {
+            seeds: Seeds::default(),
+            runs_asked: 0,
+            runs_made: 0,
+            runs_failed: 0,
+            deadlines: Deadlines::default(),
+            coverage: Coverage::of(&self.plan.kinds).into_rows(),
+            failures: Vec::new(),
+            ..self.clone()
+        }
+    }
+
+    /// Adds the runs of another part of the campaign.
+    pub(super) fn add(&mut self, other: Self) {
+        self.seeds.add(&other.seeds);
+        self.runs_asked += other.runs_asked;
+        self.runs_made += other.runs_made;
+        self.runs_failed += other.runs_failed;
+        self.deadlines.add(&other.deadlines);
+        let mut coverage = Coverage::of(&self.plan.kinds);
+        coverage.add(&self.coverage);
+        coverage.add(&other.coverage);
+        self.coverage = coverage.into_rows();
+        self.failures.extend(other.failures);
     }
 
     /// Reads the text of a `campaign.json`.
@@ -230,8 +269,8 @@ impl fmt::Display for Findings {
         };
         writeln!(
             formatter,
-            "{} of {} runs{shard} of {} cycles on {} (mode {}), seed {}\n",
-            self.runs_made, self.runs_asked, plan.cycles, self.cluster, self.mode, plan.seed
+            "{} of {} runs{shard} of {} cycles on {} (mode {}), {}\n",
+            self.runs_made, self.runs_asked, plan.cycles, self.cluster, self.mode, self.seeds
         )?;
         writeln!(formatter, "{}", self.coverage_text())?;
         let total =
@@ -255,9 +294,13 @@ impl fmt::Display for Findings {
         )?;
         for failure in self.failures.iter().take(LISTED_FAILURES) {
             let member = failure.member.as_deref().unwrap_or("all");
+            let seed = match self.seeds.count() {
+                1 => String::new(),
+                _ => format!("seed {}, ", failure.campaign_seed),
+            };
             writeln!(
                 formatter,
-                "  run {}: {} of {} faults and {} cycles are enough; cycle {}, {member}: {}",
+                "  {seed}run {}: {} of {} faults and {} cycles are enough; cycle {}, {member}: {}",
                 failure.run,
                 failure.faults,
                 failure.faults_drawn,

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::Schedule;
+use understudy_simulator::Network;
 use understudy_wire::{Member, StationId};
 
 /// What is injected. Every kind but the last five strikes one member.
@@ -134,6 +135,17 @@ impl Kind {
             Self::Write | Self::WrongProgram => &[Role::RemoteIo],
             _ => &[Role::Controller, Role::Understudy, Role::RemoteIo],
         }
+    }
+
+    /// The kinds that disturb a network, ascending.
+    pub(super) fn of_network(network: &Network) -> impl Iterator<Item = Self> + use<> {
+        let there = [
+            (Self::Loss, network.loss > 0.0),
+            (Self::Duplication, network.duplicate > 0.0),
+            (Self::Jitter, !network.jitter.is_zero()),
+            (Self::Corruption, network.corruption > 0.0),
+        ];
+        there.into_iter().filter(|(_, there)| *there).map(|(kind, _)| kind)
     }
 
     /// The kinds of which nothing wrong may come in a cluster with so many understudies.

@@ -2,7 +2,7 @@
 
 use understudy_cycle::Mode;
 use understudy_journal::{JournalState, Members};
-use understudy_simulator::{Action, Fault};
+use understudy_simulator::{Action, Fault, ShardError};
 use understudy_testing::press_cell;
 use understudy_wire::{Member, Source, StationId};
 
@@ -103,11 +103,11 @@ fn shards_of_other_campaigns_are_refused() {
         errors.expect_err("they differ").iter().map(ToString::to_string).collect();
     let expected = [
         "1/4 of 1 and 1/4 of 1 are both shard 1/4",
-        "2/4 of 2 is of another campaign than 1/4 of 1: the seed differs",
+        "2/4 of 2 is of another search than 1/4 of 1: the seed differs",
         "3 of 4 shards are missing: 2, 3, 4",
     ];
     assert_eq!(texts, expected);
-    assert_eq!(merge(Vec::new()), Err(vec![MergeError::Nothing]));
+    assert_eq!(merge(Vec::new()), Err(vec![ShardError::Nothing]));
 }
 
 /// Each small failure fails as a scenario file at the very cycle, from its own seed, and with nothing that could be left out.

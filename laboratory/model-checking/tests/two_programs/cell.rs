@@ -11,7 +11,7 @@ use understudy_plant::{ModelKind, Plant, Signals};
 use understudy_remote_io::{PairSettings, Release, StaleState, ValueFault};
 use understudy_simulator::Parts;
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Epoch, Image, ProgramHash, ProgramId, StationId,
+    ClusterHash, ConfigurationHash, Image, Moment, ProgramHash, ProgramId, StationId,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -127,7 +127,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         agreement: Arc::clone(&agreement),
         programs: Arc::clone(&programs),
         generated: None,
-        epoch: Epoch(0),
+        founds: Moment::default(),
     });
     let remote_ios = programs.iter().zip(0..);
     let remote_ios = remote_ios.map(|(program, index)| understudy_remote_io::Settings {

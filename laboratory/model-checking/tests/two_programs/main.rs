@@ -2,6 +2,7 @@
 
 mod cell;
 mod changes;
+mod shards;
 mod spares;
 mod starts;
 mod twins;

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use understudy_cycle::{Agreement, ChangeOrder, Input, Machine, Program, RemoteIoInput};
 use understudy_wire::{
-    ConfigurationHash, Epoch, Frame, Member, ProgramHash, ProgramId, SignalPlace, StationId,
+    ConfigurationHash, Epoch, Frame, Member, Moment, ProgramHash, ProgramId, SignalPlace, StationId,
 };
 
 use super::pairs::twin_of;
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, ChangeStep, Fault};
+use crate::pace::founds;
 use crate::slot::Slot;
 
 impl Simulation {
@@ -139,9 +140,11 @@ impl Simulation {
             Member::Station(station) => {
                 self.founded += 1;
                 let mut settings = self.parts.stations[station.index()].clone();
-                settings.epoch = match action {
-                    Action::RestartInEpoch { epoch } => Epoch(epoch),
-                    _ => Epoch(self.founded),
+                settings.founds = match action {
+                    Action::RestartInEpoch { epoch } => {
+                        Moment { epoch: Epoch(epoch), ..Moment::default() }
+                    }
+                    _ => founds(self.parts.stations[0].founds, self.founded),
                 };
                 settings.agreement = agreed(&settings.agreement);
                 if has_wrong_programs {

@@ -1,5 +1,6 @@
 //! Two remote I/Os of one program.
 
+use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_remote_io::{PairSettings, RemoteIo, Settings};
 use understudy_wire::{Member, Part, ProgramId, ProgramSet, StateChoice};
 
@@ -89,6 +90,26 @@ impl Simulation {
             let violation = Violation::TwoWriters { moment: moment.unwrap_or_default() };
             observe(self.now, self.pace.cycle(), other, Record::Violation(&violation));
             self.violations.push(violation);
+        }
+    }
+
+    pub(super) fn poll_remote_io(
+        &mut self,
+        member: Member,
+    ) -> Option<Output<understudy_remote_io::Event>> {
+        self.remote_io_slot(member)?.machine()?.poll_output()
+    }
+
+    pub(super) fn show_field(&mut self, program: ProgramId) {
+        if let Some(field) = self.plants.field(program) {
+            let slot = &mut self.remote_ios[program.index()];
+            let sensors = RemoteIoInput::Field(&field.sensors);
+            slot.give(self.now, Input::RemoteIo(sensors));
+            self.wakeups.set(Member::RemoteIo(program), slot.due());
+            if let Some(twin) = &mut self.twins[program.index()] {
+                twin.give(self.now, Input::RemoteIo(sensors));
+                self.wakeups.set(Member::Twin(program), twin.due());
+            }
         }
     }
 }

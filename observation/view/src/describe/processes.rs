@@ -23,9 +23,9 @@ descriptions! { host: HostEvent, members: Members;
     DuplicateGone { member } => "duplicate-gone" Notice
         format!("receives frames of one process only that runs with the keys of {}", members.name(*member));
     NewLife { life } => "new-life" Warning
-        format!("is not received by the others and continues in a new life, {life}");
+        format!("continues in a new life, {life}: the others do not receive it, or the numbers of its frames end");
     NoNewLife { reason } => "no-new-life" Warning
-        format!("is not received by the others and cannot start a new life: {reason}");
+        format!("cannot start a new life, and the others do not receive it, or the numbers of its frames end: {reason}");
     RefusedWrites { writes } => "refused-writes" Warning
         format!("{writes} writes were refused at once: more came in a second than it takes");
     RefusedConnections { connections, address } => "refused-connections" Warning format!(

@@ -126,7 +126,7 @@ fn a_link_that_is_open_again_ends_no_alarm_of_the_other_network() {
         process: 1,
         address: ([127, 0, 0, 1], 1).into(),
         link: LinkKind::Udp,
-        rights: Rights { real_time: false, locked_memory: false, lacking: Vec::new() },
+        rights: Rights { real_time: false, locked_memory: false, core: None, lacking: Vec::new() },
     };
     told.host(robot, ready);
     assert_eq!(told.lasting(i64::MAX), Vec::<String>::new());

@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::common::{findings, load, run, split};
 use understudy_cluster::{Cluster, Link, press_cell};
 use understudy_cycle::Mode;
-use understudy_wire::{Epoch, Image, Member, ProgramId, StationId};
+use understudy_wire::{Epoch, Image, Member, Moment, ProgramId, StationId};
 
 fn cell() -> Cluster {
     let (cluster, ladders) = split(press_cell());
@@ -36,11 +36,15 @@ fn every_member_has_a_name_a_place_and_settings() {
     Plant(ProgramId(1)) ram
     ");
     for rank in 0..3 {
-        let settings = cell.station_settings(StationId(rank), Epoch(7));
+        let settings =
+            cell.station_settings(StationId(rank), Moment { epoch: Epoch(7), ..Moment::default() });
         let settings = settings.expect("there are three stations");
-        assert_eq!((settings.epoch, settings.programs.len()), (Epoch(7), 2));
+        assert_eq!((settings.founds.epoch, settings.programs.len()), (Epoch(7), 2));
     }
-    assert!(cell.station_settings(StationId(3), Epoch(7)).is_none());
+    assert!(
+        cell.station_settings(StationId(3), Moment { epoch: Epoch(7), ..Moment::default() })
+            .is_none()
+    );
     assert_eq!(cell.member("nobody"), None);
     assert_eq!(cell.member_name(Member::Plant(ProgramId(2))), None);
     let robot = cell.remote_io_settings(ProgramId(0)).expect("it is there");

@@ -10,6 +10,7 @@ use nix::sys::resource::{Resource, getrlimit};
 use nix::unistd::{User, geteuid};
 
 use super::{Finding, Health, Repair, may_repair};
+use crate::cores::{isolated, shared};
 use crate::rights::{CYCLE_PRIORITY, lock_memory, run_in_real_time};
 use crate::udp::RECEIVE_BUFFER_BYTES;
 use crate::wakefulness::Wakefulness;
@@ -45,8 +46,8 @@ impl Caller {
     }
 }
 
-/// Clock, rights, limits, processors and sockets, for cycles of `period`.
-pub fn examine_machine(period: Duration) -> Vec<Finding> {
+/// Clock, rights, limits, processors, cores and sockets, for cycles of `period` of members that wait actively where `spins`.
+pub fn examine_machine(period: Duration, spins: bool) -> Vec<Finding> {
     let caller = Caller::this_process();
     let findings = [
         Some(clock_source(
@@ -57,6 +58,7 @@ pub fn examine_machine(period: Duration) -> Vec<Finding> {
         Some(memory(lock_memory(), &caller)),
         Some(descriptors(getrlimit(Resource::RLIMIT_NOFILE).map_or(0, |(_, hard)| hard), &caller)),
         processors(&governors(Path::new(PROCESSORS))),
+        Some(cores(&isolated(), &shared(), spins)),
         read(RECEIVE_BUFFER_LIMIT).and_then(|limit| sockets(&limit)),
         Some(sleeps(period)),
     ];
@@ -157,6 +159,29 @@ fn processors(governors: &[String]) -> Option<Finding> {
     Some(finding.repaired_by(Some(Repair::governor())))
 }
 
+/// Which cores a member can have for itself, to wait actively on them.
+fn cores(isolated: &[usize], shared: &[usize], spins: bool) -> Finding {
+    let list = |cores: &[usize]| cores.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    if !isolated.is_empty() {
+        let found = format!("isolated cores: {}", list(isolated));
+        return Finding::good("cores", found);
+    }
+    if !spins {
+        return Finding::good("cores", "no core is isolated; members wait without spinning");
+    }
+    let found = match shared {
+        [] => "U0511: `spin = true` has no core of its own: this process may run on one core only; members wait without spinning".to_owned(),
+        _ => format!(
+            "U0511: no core is isolated: {} members at most wait actively, on cores that other programs use too ({})",
+            shared.len(),
+            list(shared)
+        ),
+    };
+    let remedy =
+        "boot with `isolcpus` for one core of each member that runs here, or remove `spin = true`";
+    Finding::trouble("cores", Health::Warning, found, remedy)
+}
+
 fn sockets(limit: &str) -> Option<Finding> {
     let limit: usize = limit.parse().ok()?;
     if limit >= RECEIVE_BUFFER_BYTES {
@@ -207,6 +232,17 @@ mod tests {
         let command = "echo tsc > /sys/devices/system/clocksource/clocksource0/current_clocksource";
         check(clock_source("hpet", "tsc hpet"), Health::Warning, Some(command));
         check(clock_source("hpet", "hpet acpi_pm"), Health::Warning, None);
+    }
+
+    #[test]
+    fn cores_matter_where_members_spin() {
+        check(cores(&[2, 3], &[1, 2, 3], true), Health::Good, None);
+        check(cores(&[], &[], false), Health::Good, None);
+        for shared in [&[][..], &[1, 2]] {
+            let finding = cores(&[], shared, true);
+            assert!(finding.found.starts_with("U0511: "), "{finding:?}");
+            check(finding, Health::Warning, None);
+        }
     }
 
     #[test]
