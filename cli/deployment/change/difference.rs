@@ -226,7 +226,10 @@ impl OfProgram {
                     }
                 }
                 Verdict::Undecided(why) => {
-                    let _ = writeln!(text, "  `{name}` is undecided: {why}; `rehearse` shows what it did in a run");
+                    let _ = writeln!(
+                        text,
+                        "  `{name}` is undecided: {why}; `rehearse` shows what it did in a run"
+                    );
                 }
             }
         }
