@@ -51,7 +51,7 @@ struct Shown {
     json: Value,
 }
 
-/// The newest states of a run that goes on.
+/// The newest states in a run.
 pub(super) fn newest_states(run: &understudy_view::Run) -> Option<Model> {
     run.read(NEWEST).ok()
 }

@@ -1,7 +1,7 @@
 //! Proofs of a production line of k stations in a row: five state bits and two properties each.
 //!
 //! `cargo bench -p understudy-verification` prints a table; with a folder as its argument it also writes the models for NuSMV there, so that
-//! both can be run beside each other: `NuSMV -dynamic line_12.smv`. Times are processor times.
+//! both can be compared: `NuSMV -dynamic line_12.smv`. Times are processor times.
 
 #![allow(
     clippy::disallowed_methods,

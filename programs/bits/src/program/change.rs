@@ -1,7 +1,7 @@
 //! An online change: a program and the one that takes its place, on the same inputs.
 //!
 //! ```text
-//! old.y(t) = h(x(t), u(t))                          the old program goes on
+//! old.y(t) = h(x(t), u(t))                          the old program continues
 //! new.y(t) = h'(z(t), u(t))                         the new one, from the switch on
 //! z(s) = c(x(s))                                    the state that it takes over before scan s
 //! changed                                           a switch was before this scan, or is
@@ -21,11 +21,11 @@ use crate::execute::Unsupported;
 use crate::system::{Holds, Source};
 use crate::term::{Term, Variable};
 
-/// Signals of the old program stand behind it.
+/// Prefix of the signals of the old program.
 const OLD: &str = "old.";
-/// Signals of the new program stand behind it.
+/// Prefix of the signals of the new program.
 const NEW: &str = "new.";
-/// Whether an output differs stands behind it.
+/// Prefix of the signal that is TRUE where an output differs.
 const DIFFERS: &str = "differs.";
 
 /// Attempts to follow two programs so that the values of one are those of the other.
@@ -99,7 +99,7 @@ impl System {
     /// The BOOL that is TRUE from the switch on.
     pub const CHANGED: &'static str = "changed";
 
-    /// `before` and `after` on the same inputs, within their subranges. Outputs stand behind `old.` and `new.`; `differs.` and an output is
+    /// `before` and `after` on the same inputs, within their subranges. Outputs are named `old.` and `new.`, then their names; `differs.` and an output is
     /// TRUE where the two differ after the switch.
     ///
     /// # Errors
