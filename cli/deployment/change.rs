@@ -1,5 +1,6 @@
 //! `understudy change`: an online change of programs, while the cluster runs.
 
+mod difference;
 mod members;
 mod rehearsal;
 
@@ -12,10 +13,12 @@ use serde_json::{Value, json};
 use understudy_cluster::{
     ChangeTexts, ChangedInitial, Cluster, NeedsStop, Overrides, changed_initials, fates,
 };
+use understudy_text::duration::parse_positive;
 use understudy_typed::{CarriedPath, Fate};
 use understudy_view::Run;
 use understudy_wire::{ChangeRequest, ConfigurationHash, Member};
 
+use self::difference::{Differences, newest_states};
 use self::members::Members;
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -31,7 +34,8 @@ Example:
   understudy change runs/latest new/cluster.toml accept
   understudy change cell/cluster.toml new/cluster.toml cancel --keys keys/members/engineer
 
-Without a step, and with `plan`, it says what would change and touches nothing. `rehearse` computes what the new programs would have done with
+Without a step, and with `plan`, it says what would change and which outputs can then differ, by proof, and touches nothing: from the newest state of
+a run, or from every state of the old program. `rehearse` computes what the new programs would have done with
 the samples of a run. `prepare` loads the new programs at all members next to the old ones;
 `switch` changes the programs between two cycles; `accept` ends the change with the new programs, `cancel` with the old ones. A step can be given again,
 also from another machine: it continues where the members are.")]
@@ -63,6 +67,9 @@ pub(crate) struct Arguments {
     /// Scans after which a rehearsed program takes the state of the running one over anew
     #[arg(long, value_name = "SCANS", default_value_t = 100, value_parser = value_parser!(u32).range(1..))]
     renew: u32,
+    /// Time limit of the proofs of `plan`; outputs that are not decided then are reported as undecided
+    #[arg(long, value_name = "TIME", value_parser = parse_positive, default_value = "30s")]
+    budget: Duration,
     /// Directory of runs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
@@ -93,15 +100,19 @@ const LOADING_PATIENCE: Duration = Duration::from_secs(2);
 const AGAIN: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
-    let before = match arguments.before.is_dir() {
-        true => Run::open(&arguments.before)?.cluster().as_ref().clone(),
-        false => files::cluster(&arguments.before, Overrides::default())?.0,
+    let run = arguments.before.is_dir().then(|| Run::open(&arguments.before)).transpose()?;
+    let before = match &run {
+        Some(run) => run.cluster().as_ref().clone(),
+        None => files::cluster(&arguments.before, Overrides::default())?.0,
     };
     let (after, used) = files::cluster(&arguments.after, Overrides::default())?;
     let texts = ChangeTexts::between(&before, &after).map_err(|reasons| needs_stop(&reasons))?;
     let plan = Plan::of(&before, &after, &texts);
     if arguments.step == Step::Plan {
-        return Ok(plan.answer().with_used(used));
+        let live = run.as_ref().and_then(newest_states);
+        let budget = arguments.budget;
+        let differences = Differences::of(&before, &after, &texts, live.as_ref(), budget);
+        return Ok(plan.answer(&differences).with_used(used));
     }
     if texts.programs.is_empty() {
         let message = "the programs of the two files are equal: there is nothing to change";
@@ -397,13 +408,13 @@ impl Plan {
         Value::Array(programs.collect())
     }
 
-    fn answer(&self) -> Answer {
+    fn answer(&self, differences: &Differences) -> Answer {
         let text = match self.programs.is_empty() {
             true => {
                 "the programs of the two files are equal: there is nothing to change".to_owned()
             }
-            false => self.text(),
+            false => format!("{}\n\n{}", self.text(), differences.text()),
         };
-        Answer::done(text, json!({ "plan": self.json() }))
+        Answer::done(text, json!({ "plan": self.json(), "differences": differences.json() }))
     }
 }

@@ -6,6 +6,7 @@ mod animate;
 mod book;
 mod bounded;
 mod campaign;
+mod change;
 mod check;
 mod convert;
 mod des;

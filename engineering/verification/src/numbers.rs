@@ -9,6 +9,7 @@
 //! ```
 
 mod compared;
+mod difference;
 mod replay;
 #[cfg(test)]
 mod tests;
@@ -24,6 +25,7 @@ use crate::program::{Answer as CircuitAnswer, Bounds, OutputFinding, Subject, of
 use crate::property::{Asked, Formula, Path, Property};
 use crate::symbolic::{Cone, Resolved, Signal, Trace, resolve};
 use compared::Refused;
+pub use difference::Difference;
 use replay::Replay;
 pub use replay::Row;
 

@@ -69,9 +69,6 @@ pub enum Verdict {
     Fails(Option<Trace>),
 }
 
-/// Steps of a search that are single scans.
-const SINGLE: usize = 64;
-
 /// When the order of variables changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Order {
@@ -87,7 +84,7 @@ pub struct Checker<'c> {
     nodes: usize,
     go_on: GoOn<'c>,
     order: Order,
-    single: usize,
+    single: Option<usize>,
     /// That of the last property, for the next one that depends on the same part of the circuit.
     model: Option<model::Model<'c>>,
     /// The part of the circuit that was too large, and why: it is not tried again.
@@ -113,7 +110,7 @@ impl<'c> Checker<'c> {
             nodes,
             go_on: ALWAYS,
             order: Order::ByNeed,
-            single: SINGLE,
+            single: None,
             model: None,
             too_large: None,
         }
@@ -142,7 +139,7 @@ impl<'c> Checker<'c> {
     /// that show them are as short as can be as long as they have no more scans.
     #[must_use]
     pub fn with_single_scans(self, single: usize) -> Self {
-        Self { single, ..self }
+        Self { single: Some(single), ..self }
     }
 
     /// Whether every first scan satisfies `property`: the registers as they start, the inputs any.

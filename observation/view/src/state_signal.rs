@@ -143,6 +143,20 @@ impl Model {
         values
     }
 
+    /// The newest cycle of a program after which its whole state is known, and that state as stations hold it.
+    ///
+    /// # Errors
+    /// Where no cycle of the program has one.
+    pub fn newest_state(&self, program: ProgramId) -> Result<(i64, Vec<u64>), ViewError> {
+        let history = self.history_of(program)?;
+        let code = &self.cluster.controllers()[program.index()].code;
+        let steps = history.steps().iter().rev().filter(|step| !step.void);
+        let mut sampled = steps.filter_map(|step| Some((step.cycle, step.sampled.as_ref()?)));
+        let (cycle, sampled) = sampled.next().ok_or_else(|| self.no_cycle(program, 0))?;
+        let state = code.after_scan(sampled.state.words(), sampled.inputs.words());
+        Ok((cycle, state))
+    }
+
     /// x(t+1) of a program with numbers.
     fn state_after(&self, history: &History, place: usize) -> Result<Vec<u64>, ViewError> {
         let sampled = self.sampled_at(history, place)?;

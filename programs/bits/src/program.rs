@@ -7,6 +7,7 @@
 //!
 //! In every cycle each sample may be missing, and each signal may be lost: what is proved holds whatever fails.
 
+mod change;
 mod moments;
 mod restart;
 mod scan;
@@ -19,6 +20,7 @@ use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
 use crate::system::{Holds, Source, System};
 use crate::term::Term;
+pub use change::{InTheWay, Switch};
 use moments::Age;
 pub use restart::POWER_RETURNS;
 use restart::Restart;
@@ -324,6 +326,8 @@ impl System {
         let sums = self.sums(&how, &scan, &ages, &numbers);
         let can_restart = self.restarts && program.is_retentive();
         let time = if can_restart { self.restart_time(prefix, program, &ages) } else { None };
+        self.most.extend(ages.values().chain(&clock).map(|age| (age.cell, age.most)));
+        self.most.extend(sums.iter().map(|(address, &most)| (numbers[address], most)));
         self.cells[scans as usize].holds = Holds::Scans;
         self.cells[phase as usize].holds = Holds::Phase;
         for counted in timers.counted.values() {

@@ -1,6 +1,6 @@
 //! Programs on terms: the value of each cell of memory after a scan, over the values before it and the inputs.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::RangeInclusive;
 
 use understudy_typed::{Comparison, Elementary, Part, Point, Program, Type};
@@ -80,6 +80,10 @@ pub struct System {
     pub(crate) restarts: bool,
     /// The inputs that restart programs, by their numbers.
     pub restarting: Vec<u32>,
+    /// Where cells stop that count a time: past it no answer changes.
+    pub(crate) most: BTreeMap<u32, i64>,
+    /// Times since moments that are counted at least so far, by the prefix of their program and their address.
+    pub(crate) least: BTreeMap<(String, u64), i64>,
     /// Names of numbers that properties compare.
     pub(crate) wanted: BTreeSet<String>,
     /// Numbers that properties compare: after the scan, an input in the scan.
@@ -138,6 +142,8 @@ impl System {
             shown: Vec::new(),
             restarts: false,
             restarting: Vec::new(),
+            most: BTreeMap::new(),
+            least: BTreeMap::new(),
             wanted: BTreeSet::new(),
             numbers: Vec::new(),
             values: HashMap::new(),

@@ -104,6 +104,13 @@ impl Diagrams {
         self.reordered(Need::early)
     }
 
+    /// Leaves the order as it is below this number of nodes, as far as there is room.
+    pub fn expect(&self, nodes: usize) {
+        if let Some(need) = &self.need {
+            need.expect(nodes);
+        }
+    }
+
     fn reordered(self, need: impl FnOnce(usize) -> Need) -> Self {
         let limit = self.limit;
         let room = Need::room(limit);

@@ -118,16 +118,8 @@ impl Program {
         told: Told<'_>,
         (partners, is_listed): (&[Option<usize>], bool),
     ) -> CarriedState {
-        let points = self.inputs.iter().chain(&self.outputs).filter(|point| point.range.is_some());
-        let mut walk = Walk {
-            old: before,
-            new: self,
-            kept: state,
-            told,
-            is_listed,
-            state: self.initial_state(),
-            declared: points.map(|point| (point.slot, point.declared())).collect(),
-        };
+        let mut walk = Walk::new(before, self, state, told);
+        walk.is_listed = is_listed;
         let paths = walk.variables(partners);
         if self.is_retentive() && before.is_retentive() {
             let time = i128::from(before.period.max(1)) * i128::from(state[SCANS]);
@@ -137,6 +129,17 @@ impl Program {
         }
         CarriedState { state: walk.state, paths }
     }
+}
+
+/// A value of a new program that is one of the old program, by the addresses of both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Origin {
+    /// Address in the state of the old program.
+    pub before: u64,
+    /// Address in the state of the new program.
+    pub now: u64,
+    /// Whether it is stored alike in both.
+    pub is_same: bool,
 }
 
 /// A program in the place of another one, in an online change: it takes over the values of all variables, and not of the retentive ones alone. A program
@@ -174,6 +177,15 @@ impl Successor {
     /// As [`Self::state`].
     pub fn carried(&self, state: &[u64], told: Told<'_>) -> CarriedState {
         self.take(state, told, true)
+    }
+
+    /// Where the values of the new program come from; those of all others are the initial ones, but for the slots of the header, which are kept.
+    pub fn origins(&self) -> Vec<Origin> {
+        let state = self.old.initial_state();
+        let mut walk = Walk::new(&self.old, &self.new, &state, Told::ALL);
+        walk.origins = Some(Vec::new());
+        walk.variables(&self.partners);
+        walk.origins.unwrap_or_default()
     }
 
     fn take(&self, state: &[u64], told: Told<'_>, is_listed: bool) -> CarriedState {
@@ -259,9 +271,32 @@ struct Walk<'p> {
     state: Vec<u64>,
     /// Points of the new program with a subrange, by their slots.
     declared: HashMap<u32, Declared>,
+    /// Where values come from, if that is asked for.
+    origins: Option<Vec<Origin>>,
 }
 
 impl<'p> Walk<'p> {
+    fn new(old: &'p Program, new: &'p Program, kept: &'p [u64], told: Told<'p>) -> Self {
+        let points = new.inputs.iter().chain(&new.outputs).filter(|point| point.range.is_some());
+        Self {
+            old,
+            new,
+            kept,
+            told,
+            is_listed: false,
+            state: new.initial_state(),
+            declared: points.map(|point| (point.slot, point.declared())).collect(),
+            origins: None,
+        }
+    }
+
+    /// Notes that a value comes from an address of the old program.
+    fn comes_from(&mut self, before: u64, now: u64, conversion: Option<&Conversion>) {
+        if let Some(origins) = &mut self.origins {
+            origins.push(Origin { before, now, is_same: conversion == Some(&Conversion::Same) });
+        }
+    }
+
     /// Takes over each variable; `partners` are those of the new program in the old one.
     fn variables(&mut self, partners: &[Option<usize>]) -> Vec<CarriedPath> {
         let (old, new) = (self.old, self.new);
@@ -358,6 +393,7 @@ impl<'p> Walk<'p> {
             };
         }
         if let (Type::Text(before), Type::Text(now)) = (from.of, to.of) {
+            self.comes_from(64 * first as u64, 64 * second as u64, None);
             if before > now {
                 return Fate::Dropped;
             }
@@ -369,6 +405,7 @@ impl<'p> Walk<'p> {
         let Some(conversion) = conversion((self.old, from.of), (self.new, to.of)) else {
             return Fate::Dropped;
         };
+        self.comes_from(64 * first as u64, 64 * second as u64, Some(&conversion));
         let value = conversion.of(self.kept[first]);
         let declared = self.declared.get(&to.slot);
         let value = value.filter(|value| declared.is_none_or(|range| range.contains(*value)));

@@ -27,7 +27,7 @@ mod types;
 mod validate;
 mod visit;
 
-pub use self::carried::{CarriedPath, CarriedState, Fate, Successor, Told};
+pub use self::carried::{CarriedPath, CarriedState, Fate, Origin, Successor, Told};
 pub use self::cost::Cost;
 pub use self::edges::EdgeMemory;
 pub use self::fault::{Cause, Fault};

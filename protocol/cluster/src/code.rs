@@ -216,6 +216,11 @@ impl Code {
         (0..part.of.slots()).any(|slot| layout.holds(part.address + 64 * slot))
     }
 
+    /// Whether the states that stations hold have the value at an address.
+    pub(crate) fn holds_address(&self, address: u64) -> bool {
+        self.layout().is_none_or(|layout| layout.holds(address))
+    }
+
     fn told<'a>(&'a self, before: &'a Self) -> Held<'a> {
         let held = |layout: Option<&'a Layout>| {
             move |address| layout.is_none_or(|layout| layout.holds(address))

@@ -28,6 +28,7 @@ mod schema;
 mod settings;
 mod source;
 mod source_text;
+mod taken_over;
 mod template;
 mod undriven;
 mod value;
@@ -56,5 +57,6 @@ pub use source::{
     GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
 };
 pub use source_text::{SourceText, read_kept};
+pub use taken_over::{nearest_of, origins, states_at_change};
 pub use template::{TemplateFile, minimal, modbus_cell, press_cell, read_with_files, template};
 pub use understudy_executable::{stored_value, typed_value, value_text};

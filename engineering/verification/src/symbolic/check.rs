@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use understudy_logic::bdd::Diagram;
+use understudy_logic::bdd::{BddError, Diagram};
 
 use super::core::Core;
 use super::model::Model;
@@ -135,8 +135,12 @@ impl Model<'_> {
             let jumps = self.jumps()?.iter().zip(ways.as_deref().unwrap_or_default());
             for (jump, way) in jumps {
                 self.goes_on()?;
-                let before = self.diagrams.substitute(&known, &jump.step)?;
-                let next = self.enter(&known, way, &before)?;
+                let before = self.diagrams.substitute(&known, &jump.step);
+                let Ok(next) = before.and_then(|before| self.enter(&known, way, &before)) else {
+                    // Single scans find the same states, with smaller sets on their way.
+                    ways = Some(Vec::new());
+                    break;
+                };
                 if next != known {
                     if fresh.is_some() {
                         fresh = self.fresh(fresh, &next, &known)?;
@@ -167,20 +171,28 @@ impl Model<'_> {
     }
 
     /// `known`, and what of `hold` comes `before` it.
-    fn enter(&self, known: &Diagram, hold: &Diagram, before: &Diagram) -> Result<Diagram, Stopped> {
+    fn enter(
+        &self,
+        known: &Diagram,
+        hold: &Diagram,
+        before: &Diagram,
+    ) -> Result<Diagram, BddError> {
         let entering = self.diagrams.and(hold, before)?;
-        Ok(self.diagrams.or(known, &entering)?)
+        self.diagrams.or(known, &entering)
     }
 
-    /// For each jump where all its scans are in `hold`.
+    /// For each jump where all its scans are in `hold`; for the longest ones nothing, where this is too large.
     fn ways(&self, hold: &Diagram) -> Result<Vec<Diagram>, Stopped> {
         let mut ways: Vec<Diagram> = Vec::new();
         let jumps = self.jumps()?;
         let steps = jumps.iter().map(|jump| &jump.step);
         for step in iter::once(&self.step).chain(steps).take(jumps.len()) {
             let held = ways.last().unwrap_or(hold);
-            let later = self.diagrams.substitute(held, step)?;
-            ways.push(self.diagrams.and(held, &later)?);
+            let later = self.diagrams.substitute(held, step);
+            let Ok(way) = later.and_then(|later| self.diagrams.and(held, &later)) else {
+                break;
+            };
+            ways.push(way);
         }
         Ok(ways)
     }

@@ -65,6 +65,13 @@ impl Cone {
     }
 }
 
+/// The least steps of a search that are single scans. There are more where there are many registers: through a line of stations a part goes in about as
+/// many scans as there are registers, and jumps of stations that work at the same time are large functions.
+const SINGLE: usize = 64;
+
+/// Nodes for each register below which the order is not changed early: what many registers need in a good order takes longer to reorder than to compute.
+const USUAL: usize = 200;
+
 /// A circuit's part as diagrams over (x, u).
 pub(super) struct Model<'c> {
     pub(super) circuit: &'c Circuit,
@@ -94,7 +101,7 @@ impl<'c> Model<'c> {
         cone: Cone,
         fair: &[Resolved],
         diagrams: impl FnOnce(Vec<Variable>) -> Diagrams,
-        single: usize,
+        single: Option<usize>,
         go_on: GoOn<'c>,
     ) -> Result<Self, Stopped> {
         let graph = circuit.graph();
@@ -107,6 +114,7 @@ impl<'c> Model<'c> {
             })
             .collect();
         let diagrams = diagrams(order(circuit, &cone, &registers));
+        diagrams.expect(USUAL * registers.len());
         let inputs = cone.variables.iter().copied();
         let inputs = inputs.filter(|variable| matches!(variable, Variable::Input(_)));
         let inputs = diagrams.product(inputs)?;
@@ -130,7 +138,7 @@ impl<'c> Model<'c> {
             inputs,
             next: pairs,
             step,
-            single,
+            single: single.unwrap_or(SINGLE.max(registers.len() / 4 * 5)),
             jumps: OnceCell::new(),
             signals: Vec::new(),
             fair: Vec::new(),

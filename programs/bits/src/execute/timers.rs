@@ -76,6 +76,12 @@ impl Counted {
         self.address + 64 * slot
     }
 
+    /// Whether another timer has the same state for each count.
+    pub(crate) fn counts_as(&self, other: &Self) -> bool {
+        let kind = |counted: &Self| (counted.variables.timer, counted.scans, counted.preset);
+        kind(self) == kind(other)
+    }
+
     /// The address whose cell has the count.
     pub(crate) fn start(&self) -> u64 {
         self.at(self.variables.start)

@@ -107,26 +107,39 @@ impl Layout {
 
     /// The number of a cell in a state, which may be one that the program does not reach.
     fn number(&self, holds: &Holds, extent: Extent, state: &[u64]) -> Option<i128> {
+        holds.number(state, extent.high, (self.period, self.together))
+    }
+}
+
+impl Holds {
+    /// The number that a cell has for a state, up to `most` where it counts the time since something; none where no number tells that state. The times
+    /// are the period, and the scans after which all tasks begin together again.
+    pub(crate) fn number(
+        &self,
+        state: &[u64],
+        most: i128,
+        (period, together): (i64, u64),
+    ) -> Option<i128> {
         let scans = state[SCANS];
-        let now = self.period.saturating_mul(scans as i64);
+        let now = period.saturating_mul(scans as i64);
         let stored = |address: u64, of: Elementary| {
             state[(address / 64) as usize] >> (address % 64) & of.mask()
         };
-        Some(match holds {
+        Some(match self {
             Holds::Value(address, of) if of.is_real() => i128::from(stored(*address, *of)),
             Holds::Value(address, of) => of.signed(stored(*address, *of)),
             // What is longer ago than anything compares is as long ago as that.
             Holds::Age(address) => {
                 let moment = stored(*address, Elementary::Time) as i64;
-                i128::from(now.saturating_sub(moment)).min(extent.high)
+                i128::from(now.saturating_sub(moment)).min(most)
             }
             Holds::Count(counted) => {
                 let at = |address| stored(address, Elementary::Lword);
-                i128::from(counted.count(at, now, self.period)?)
+                i128::from(counted.count(at, now, period)?)
             }
-            Holds::Clock => i128::from(now).min(extent.high),
+            Holds::Clock => i128::from(now).min(most),
             Holds::Scans => i128::from(scans),
-            Holds::Phase => i128::from(scans % self.together),
+            Holds::Phase => i128::from(scans % together),
             Holds::Other => return None,
         })
     }

@@ -61,6 +61,10 @@ impl System {
             let all = counted.len() == ages.len();
             ages = counted;
             if all {
+                for (&address, age) in &mut ages {
+                    let least = self.least.get(&(scan.prefix.to_owned(), address));
+                    age.most = age.most.max(least.copied().unwrap_or(0));
+                }
                 return Ok((scanned, ages));
             }
         }

@@ -48,6 +48,13 @@ impl Need {
         Self { limit, at_bound, count_at, change_at }
     }
 
+    /// No change below this number of nodes, as far as there is room.
+    pub(super) fn expect(&self, nodes: usize) {
+        let nodes = nodes.min(self.limit / 4 * 3);
+        self.count_at.fetch_max(nodes, Ordering::Relaxed);
+        self.change_at.fetch_max(nodes, Ordering::Relaxed);
+    }
+
     /// Nodes that there are in all: swaps need room.
     pub(super) fn room(limit: usize) -> usize {
         limit.saturating_mul(2)

@@ -111,6 +111,7 @@ impl<'p> Walk<'p> {
             let is_retentive = |program: &crate::form::Program, slot| program.retains(slot as u32);
             let (target, shift) = at(to, place(new, both, element) * new.stride());
             let value = conversion.of(value).filter(|_| is_retentive(self.old, slot));
+            self.comes_from(64 * slot as u64 + bit, 64 * target as u64 + shift, Some(&conversion));
             match value.filter(|_| is_retentive(self.new, target)) {
                 Some(_) if !(self.told.is_known)(64 * slot as u64 + bit) => {
                     if (self.told.is_read)(64 * target as u64 + shift) {

@@ -1,0 +1,88 @@
+//! Which outputs of a program can differ after an online change: the old program and the new one are followed together on the same inputs.
+
+use understudy_bits::{InTheWay, Inexact, Switch, System};
+use understudy_logic::Circuit;
+use understudy_typed::{Elementary, Program};
+
+use super::{Answer, Model};
+use crate::program::Bounds;
+use crate::property::{Asked, Formula};
+use crate::symbolic::{Resolved, Signal};
+
+/// Two programs, ready for the question where they differ.
+pub struct Difference {
+    model: Model,
+    /// For each output its name, and that both programs have it alike from the change on.
+    outputs: Vec<(String, Resolved)>,
+}
+
+impl Difference {
+    /// A program and the one that takes its place.
+    ///
+    /// # Errors
+    /// What of them, or of the state that the new one takes over, is not followed.
+    pub fn between(
+        before: &Program,
+        after: &Program,
+        switch: Switch<'_>,
+    ) -> Result<Self, InTheWay> {
+        let system = System::of_change(before, after, switch)?;
+        let model = Model::of(system, 0, &Asked::default())?;
+        let outputs = after.outputs.iter().map(|point| {
+            let equal = model.alike(&point.name, point.of, switch);
+            (point.name.clone(), equal.always())
+        });
+        let outputs = outputs.collect();
+        Ok(Self { model, outputs })
+    }
+
+    /// The outputs that are compared.
+    pub fn outputs(&self) -> impl Iterator<Item = &str> {
+        self.outputs.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// The circuit whose signals runs show.
+    pub fn circuit(&self) -> &Circuit {
+        self.model.circuit()
+    }
+
+    /// What is not followed bit by bit: an output that is proved to be alike all the same is.
+    pub fn inexact(&self) -> Option<Inexact> {
+        self.model.exact_circuit().err()
+    }
+
+    /// For each output, in the order of [`Self::outputs`], whether both programs have it alike in every run; a run that fails ends with the scan in which
+    /// they differ. `answered` is told each output that was decided.
+    pub fn check(&self, bounds: Bounds<'_>, answered: &mut dyn FnMut()) -> Vec<Answer> {
+        let properties: Vec<Resolved> =
+            self.outputs.iter().map(|(_, alike)| alike.clone()).collect();
+        self.model.check(&properties, &[], bounds, answered)
+    }
+}
+
+impl Model {
+    /// That two programs have an output alike in a scan after the change.
+    fn alike(&self, output: &str, of: Elementary, switch: Switch<'_>) -> Resolved {
+        let signal = |name: String| {
+            let mut outputs = self.circuit().outputs().iter();
+            let found = outputs.position(|output| output.name == name);
+            found.map(|place| Formula::Signal(Signal::Output(place)))
+        };
+        let differs = || {
+            let differs = signal(System::differs(output));
+            differs.unwrap_or(Formula::Constant(false)).negated()
+        };
+        if of != Elementary::Bool {
+            return differs();
+        }
+        let [old, new] = System::both_of(output).map(signal);
+        let (Some(old), Some(new)) = (old, new) else {
+            return differs();
+        };
+        let alike = Formula::Same(Box::new(old), Box::new(new));
+        match (switch, signal(System::CHANGED.to_owned())) {
+            (Switch::AnyScan { .. }, Some(changed)) => changed.implies(alike),
+            _ => alike,
+        }
+    }
+}

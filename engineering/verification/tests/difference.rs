@@ -1,0 +1,311 @@
+//! Differences after an online change, against runs of both programs: random pairs of small programs, from every state and from one.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt::Write as _;
+
+use understudy_bits::{InTheWay, Switch};
+use understudy_structured_text::{Options, lower, parser};
+use understudy_typed::{Interpreter, Program, Successor, Told};
+use understudy_verification::numbers::{Answer, Difference, Run};
+use understudy_verification::program::Bounds;
+
+/// Scans of the runs that are all tried.
+const DEPTH: usize = 8;
+/// Pairs of states of one depth that are followed.
+const PAIRS: usize = 1_500;
+
+fn lowered(text: &str) -> Program {
+    let (file, _) = parser::parse(text);
+    let lowered = lower(&file, &Options { text, ..Options::default() });
+    lowered.program.unwrap_or_else(|| panic!("{text}\n{:?}", lowered.diagnostics))
+}
+
+/// Numbers from a seed (SplitMix64).
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ (mixed >> 31)) % bound as u64) as usize
+    }
+
+    fn one<'a>(&mut self, of: &[&'a str]) -> &'a str {
+        of[self.below(of.len())]
+    }
+
+    fn condition(&mut self) -> String {
+        let signals = ["a", "b", "m", "x", "y", "t.Q", "e.Q", "k >= 1", "t.ET >= T#20ms"];
+        let not = self.one(&["", "", "NOT "]);
+        let first = self.one(&signals);
+        match self.below(3) {
+            0 => format!("{not}({first})"),
+            _ => {
+                let between = self.one(&["AND", "OR", "XOR"]);
+                format!("{not}({first}) {between} ({})", self.one(&signals))
+            }
+        }
+    }
+}
+
+/// A program before it is written.
+#[derive(Clone)]
+struct Sketch {
+    types: HashMap<&'static str, &'static str>,
+    statements: Vec<String>,
+}
+
+impl Sketch {
+    fn new(dice: &mut Dice) -> Self {
+        let kind = dice.one(&["TON", "TON", "TOF", "TP"]);
+        let types = HashMap::from([("m", "BOOL"), ("k", "INT"), ("t", kind), ("e", "R_TRIG")]);
+        let mut statements: Vec<String> =
+            (0..3 + dice.below(3)).map(|_| Self::statement(dice)).collect();
+        let shown =
+            |dice: &mut Dice| dice.one(&["m", "t.Q", "e.Q", "k >= 1", "m XOR t.Q"]).to_owned();
+        statements.push(format!("x := {};", shown(dice)));
+        statements.push(format!("y := {};", shown(dice)));
+        statements.push("n := k;".to_owned());
+        Self { types, statements }
+    }
+
+    fn statement(dice: &mut Dice) -> String {
+        let condition = dice.condition();
+        match dice.below(5) {
+            0 => format!("m := {condition};"),
+            1 => {
+                let last = 1 + dice.below(3);
+                format!(
+                    "IF {condition} THEN k := k + 1; END_IF; IF k > {last} THEN k := 0; END_IF;"
+                )
+            }
+            2 | 3 => format!("t(IN := {condition}, PT := T#{}0ms);", 1 + dice.below(4)),
+            _ => format!("e(CLK := {condition}); IF e.Q THEN m := NOT m; END_IF;"),
+        }
+    }
+
+    /// Another program, mostly with the same variables.
+    fn changed(&self, dice: &mut Dice) -> Self {
+        let mut changed = self.clone();
+        let place = dice.below(changed.statements.len());
+        match dice.below(10) {
+            0 => drop(changed.types.insert("t", "TON")),
+            1 => drop(changed.types.insert("k", "DINT")),
+            2 => {
+                changed.types.remove("m");
+                changed.types.insert("other", "BOOL");
+                for statement in &mut changed.statements {
+                    *statement = statement.replace('m', "other").replace("others", "ms");
+                }
+            }
+            3 => changed.statements.swap(0, place),
+            4 | 5 => {
+                let [short, long] = ["T#10ms", "T#40ms"];
+                let turn =
+                    |statement: &String| statement.replace(short, "T#30ms").replace(long, short);
+                changed.statements = changed.statements.iter().map(turn).collect();
+            }
+            6 => changed.statements.insert(place, changed.statements[place].clone()),
+            _ => changed.statements[place] = Self::statement(dice),
+        }
+        changed
+    }
+
+    fn program(&self) -> Program {
+        let mut text = String::from(
+            "PROGRAM p\n VAR_INPUT a, b : BOOL; END_VAR\n VAR_OUTPUT x, y : BOOL; n : DINT; END_VAR\n VAR ",
+        );
+        let mut types: Vec<_> = self.types.iter().collect();
+        types.sort_unstable();
+        for (name, of) in types {
+            let _ = write!(text, "{name} : {of}; ");
+        }
+        let _ = write!(text, "END_VAR\n {}\nEND_PROGRAM", self.statements.join("\n "));
+        lowered(&text)
+    }
+}
+
+/// Both programs, and how the state of one becomes that of the other.
+struct Pair {
+    old: Program,
+    new: Program,
+    engines: [Interpreter; 2],
+    successor: Successor,
+}
+
+impl Pair {
+    fn new(old: Program, new: Program) -> Self {
+        let engines = [Interpreter::new(&old), Interpreter::new(&new)];
+        let successor = Successor::new(&old, &new, &HashMap::new());
+        Self { old, new, engines, successor }
+    }
+
+    fn converted(&self, state: &[u64]) -> Vec<u64> {
+        self.successor.state(state, Told::ALL)
+    }
+
+    /// The state of one of the programs after a scan, and its outputs in the order of its points.
+    fn scan(&self, which: usize, state: &[u64], inputs: [bool; 2]) -> (Vec<u64>, Vec<u64>) {
+        let program = [&self.old, &self.new][which];
+        let mut image = program.inputs.initial_image();
+        for (name, value) in ["a", "b"].into_iter().zip(inputs) {
+            let point = program.inputs.find(name).expect("an input");
+            point.set(&mut image, value.into());
+        }
+        let mut outputs = vec![0; program.outputs.width().div_ceil(64)];
+        let mut state = state.to_vec();
+        self.engines[which].step(&mut state, &image, &mut outputs);
+        let values = program.outputs.iter().map(|point| point.get(&outputs));
+        (state, values.collect())
+    }
+
+    /// For each output the fewest scans after which it can differ, of those that were tried; and whether all were.
+    fn naive(&self, start: Option<&[u64]>) -> (Vec<Option<usize>>, bool) {
+        let mut olds: HashSet<Vec<u64>> = HashSet::new();
+        let mut pairs: HashSet<[Vec<u64>; 2]> = HashSet::new();
+        match start {
+            Some(state) => {
+                pairs.insert([state.to_vec(), self.converted(state)]);
+            }
+            None => {
+                olds.insert(self.engines[0].initial().to_vec());
+            }
+        }
+        let mut found = vec![None; self.new.outputs.len()];
+        let mut is_whole = true;
+        for scans in 1..=DEPTH {
+            pairs.extend(olds.iter().map(|state| [state.clone(), self.converted(state)]));
+            is_whole &= pairs.len() <= PAIRS && olds.len() <= PAIRS;
+            let mut next = HashSet::new();
+            for [one, other] in pairs.iter().take(PAIRS) {
+                for inputs in INPUTS {
+                    let [(one, left), (other, right)] =
+                        [self.scan(0, one, inputs), self.scan(1, other, inputs)];
+                    for (output, known) in found.iter_mut().enumerate() {
+                        if known.is_none() && left[output] != right[output] {
+                            *known = Some(scans);
+                        }
+                    }
+                    next.insert([one, other]);
+                }
+            }
+            pairs = next;
+            let after = olds
+                .iter()
+                .take(PAIRS)
+                .flat_map(|state| INPUTS.map(|inputs| self.scan(0, state, inputs).0));
+            olds = after.collect();
+        }
+        (found, is_whole)
+    }
+
+    /// Whether an output differs in the last scan of a run.
+    fn differs(
+        &self,
+        difference: &Difference,
+        run: &Run,
+        start: Option<&[u64]>,
+        output: usize,
+    ) -> bool {
+        let circuit = difference.circuit();
+        let mut old = start.unwrap_or(self.engines[0].initial()).to_vec();
+        let mut new = start.map(|state| self.converted(state));
+        let mut is_apart = false;
+        for row in &run.trace.scans {
+            let of = |name: &str| {
+                let place = circuit.inputs().iter().position(|input| input == name);
+                place.is_some_and(|place| row.inputs[place])
+            };
+            if of("change") && new.is_none() {
+                new = Some(self.converted(&old));
+            }
+            let inputs = ["a", "b"].map(of);
+            let (after, left) = self.scan(0, &old, inputs);
+            old = after;
+            is_apart = false;
+            if let Some(state) = &mut new {
+                let (after, right) = self.scan(1, state, inputs);
+                is_apart = left[output] != right[output];
+                *state = after;
+            }
+        }
+        is_apart
+    }
+}
+
+const INPUTS: [[bool; 2]; 4] = [[false, false], [false, true], [true, false], [true, true]];
+
+/// Verdicts of the outputs of random pairs.
+#[derive(Debug, Default)]
+struct Counts {
+    equal: u32,
+    differs: u32,
+    in_the_way: u32,
+}
+
+fn check(seed: u64, from_one_state: bool, counts: &mut Counts) {
+    let mut dice = Dice(seed);
+    let old = Sketch::new(&mut dice);
+    let new = old.changed(&mut dice);
+    let pair = Pair::new(old.program(), new.program());
+    let told =
+        format!("seed {seed}\n{}\nto\n{}", old.statements.join("\n"), new.statements.join("\n"));
+    let mut state = pair.engines[0].initial().to_vec();
+    for _ in 0..dice.below(12) {
+        state = pair.scan(0, &state, INPUTS[dice.below(4)]).0;
+    }
+    let start = from_one_state.then_some(state.as_slice());
+    let origins = pair.successor.origins();
+    let after = start.map(|state| pair.converted(state));
+    let switch = match (start, &after) {
+        (Some(before), Some(after)) => Switch::Now { before, after },
+        _ => Switch::AnyScan { origins: &origins },
+    };
+    let difference = match Difference::between(&pair.old, &pair.new, switch) {
+        Ok(difference) => difference,
+        Err(InTheWay::Value { .. }) => {
+            counts.in_the_way += 1;
+            return;
+        }
+        Err(error) => panic!("{told}\n{error}"),
+    };
+    assert!(difference.inexact().is_none(), "{told}");
+    let (found, is_whole) = pair.naive(start);
+    let answers = difference.check(Bounds::default(), &mut || {});
+    for (output, (answer, found)) in answers.into_iter().zip(found).enumerate() {
+        let name = &pair.new.outputs.iter().nth(output).expect("an output").name;
+        match answer {
+            Answer::Holds(_) => {
+                counts.equal += 1;
+                assert_eq!(found, None, "{told}\n`{name}` differs");
+            }
+            Answer::Fails(Some(run)) => {
+                counts.differs += 1;
+                assert!(pair.differs(&difference, &run, start, output), "{told}\n`{name}` {run:?}");
+                let scans = run.trace.scans.len();
+                if is_whole && scans <= DEPTH {
+                    assert_eq!(found, Some(scans), "{told}\n`{name}`: the run is no shortest one");
+                }
+                assert!(found.is_none_or(|found| found <= scans || !is_whole), "{told}\n`{name}`");
+            }
+            other => panic!("{told}\n`{name}`: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn differences_from_any_scan_are_those_of_runs() {
+    let mut counts = Counts::default();
+    (0..200).for_each(|seed| check(seed, false, &mut counts));
+    assert!(counts.equal > 80 && counts.differs > 80, "{counts:?}");
+    assert!(counts.in_the_way < 60, "{counts:?}");
+}
+
+#[test]
+fn differences_from_one_state_are_those_of_runs() {
+    let mut counts = Counts::default();
+    (1_000..1_200).for_each(|seed| check(seed, true, &mut counts));
+    assert!(counts.equal > 80 && counts.differs > 80, "{counts:?}");
+    assert!(counts.in_the_way == 0, "{counts:?}");
+}

@@ -1,0 +1,436 @@
+//! An online change: a program and the one that takes its place, on the same inputs.
+//!
+//! ```text
+//! old.y(t) = h(x(t), u(t))                          the old program continues
+//! new.y(t) = h'(z(t), u(t))                         the new one, from the switch on
+//! z(s) = c(x(s))                                    the state that it takes over before scan s
+//! changed                                           a switch was before this scan, or is
+//! ```
+//!
+//! The switch is before the first scan, from two states at hand, or before any scan of the old program. Then every read of a cell of the new program is
+//! replaced by `changed before ? z(i) : c(x)(i)`, as for a warm start. What cannot be taken over cell by cell is told.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use understudy_typed::{Comparison, Elementary, Operation, Origin, Program};
+
+use super::{Outputs, together};
+use crate::System;
+use crate::execute::Unsupported;
+use crate::system::{Holds, Source};
+use crate::term::{Term, Variable};
+
+/// Prefix of the signals of the old program.
+const OLD: &str = "old.";
+/// Prefix of the signals of the new program.
+const NEW: &str = "new.";
+/// Prefix of the signal that is TRUE where an output differs.
+const DIFFERS: &str = "differs.";
+
+/// Attempts to follow two programs so that the values of one are those of the other.
+const ATTEMPTS: u32 = 6;
+
+/// When the new program takes the place of the old one.
+#[derive(Debug, Clone, Copy)]
+pub enum Switch<'a> {
+    /// Before the first scan, in these states of the two programs.
+    Now {
+        /// State of the old program.
+        before: &'a [u64],
+        /// State of the new program.
+        after: &'a [u64],
+    },
+    /// Before any scan of the old program: where the input [`System::CHANGE`] is TRUE for the first time.
+    AnyScan {
+        /// Where the values of the new program come from; see [`understudy_typed::Successor::origins`].
+        origins: &'a [Origin],
+    },
+}
+
+/// Why two programs are not compared.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum InTheWay {
+    /// A statement of one of them cannot be followed.
+    #[error(transparent)]
+    Unsupported(#[from] Unsupported),
+    /// A value that the new program takes over is not followed.
+    #[error("`{name}` {why}")]
+    Value {
+        /// The variable.
+        name: String,
+        /// What about it.
+        why: &'static str,
+    },
+}
+
+/// A program of the two.
+struct Side<'p> {
+    prefix: &'static str,
+    program: &'p Program,
+    cells: Range<u32>,
+    outputs: Outputs,
+}
+
+/// What must be followed in another way, so that values of one program are those of the other.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Asked {
+    /// Variables with a cell of their own; a timer with one is not counted in scans.
+    wanted: BTreeSet<String>,
+    /// Times that are counted so far at least.
+    least: BTreeMap<(String, u64), i64>,
+}
+
+/// Both programs in one system.
+struct Both<'p> {
+    old: Side<'p>,
+    new: Side<'p>,
+    /// Where what is named of the new program begins, among the BOOLs and among all others.
+    named: [usize; 2],
+    origins: BTreeMap<u64, Origin>,
+}
+
+type Begun = Result<Term, &'static str>;
+
+impl System {
+    /// The input of [`Switch::AnyScan`].
+    pub const CHANGE: &'static str = "change";
+
+    /// The BOOL that is TRUE from the switch on.
+    pub const CHANGED: &'static str = "changed";
+
+    /// `before` and `after` on the same inputs, within their subranges. Outputs are named `old.` and `new.`, then their names; `differs.` and an output is
+    /// TRUE where the two differ after the switch.
+    ///
+    /// # Errors
+    /// What is in the way.
+    pub fn of_change(
+        before: &Program,
+        after: &Program,
+        switch: Switch<'_>,
+    ) -> Result<Self, InTheWay> {
+        let origins: BTreeMap<u64, Origin> = match switch {
+            Switch::Now { .. } => BTreeMap::new(),
+            Switch::AnyScan { origins } => {
+                origins.iter().map(|origin| (origin.now, *origin)).collect()
+            }
+        };
+        let mut asked = Asked::default();
+        for _ in 0..ATTEMPTS {
+            let known = asked.clone();
+            let Asked { wanted, least } = known.clone();
+            let mut system = Self { wanted, least, ..Self::new(&after.name) };
+            let mut both = system.both(before, after, origins.clone())?;
+            let changed = match switch {
+                Switch::Now { before, after } => {
+                    system.begin(&both.old, before, &mut asked);
+                    system.begin(&both.new, after, &mut asked);
+                    Ok(system.terms.boolean(true))
+                }
+                Switch::AnyScan { .. } => system.take_over(&mut both, &mut asked),
+            };
+            if asked == known {
+                system.observe_differences(&both, changed?);
+                return Ok(system);
+            }
+        }
+        let name = after.name.clone();
+        Err(InTheWay::Value { name, why: "has times that depend on each other" })
+    }
+
+    /// The name of the BOOL that is TRUE where an output differs after the switch.
+    pub fn differs(output: &str) -> String {
+        format!("{DIFFERS}{output}")
+    }
+
+    /// The names of an output in the old and in the new program.
+    pub fn both_of(output: &str) -> [String; 2] {
+        [OLD, NEW].map(|prefix| format!("{prefix}{output}"))
+    }
+
+    fn both<'p>(
+        &mut self,
+        before: &'p Program,
+        after: &'p Program,
+        origins: BTreeMap<u64, Origin>,
+    ) -> Result<Both<'p>, Unsupported> {
+        let points = before.inputs.iter().filter(|point| point.slot != 0);
+        let sources: Vec<Source> = points.map(Source::declared).collect();
+        let given = super::sources_as_terms(self, "", &before.inputs, &sources);
+        let known: BTreeMap<&str, Term> =
+            before.inputs.iter().map(|point| point.name.as_str()).zip(given.clone()).collect();
+        let of_new = after.inputs.iter().map(|point| match known.get(point.name.as_str()) {
+            Some(&term) => term,
+            None => self.input(point.name.clone(), point.of, None),
+        });
+        let of_new: Vec<Term> = of_new.collect();
+        let old = self.side(OLD, before, &given)?;
+        let named = [self.observed.len(), self.shown.len()];
+        let new = self.side(NEW, after, &of_new)?;
+        Ok(Both { old, new, named, origins })
+    }
+
+    fn side<'p>(
+        &mut self,
+        prefix: &'static str,
+        program: &'p Program,
+        inputs: &[Term],
+    ) -> Result<Side<'p>, Unsupported> {
+        let first = self.cells.len() as u32;
+        let runs = self.terms.boolean(true);
+        let outputs = self.add_program(prefix, program, inputs, runs)?;
+        Ok(Side { prefix, program, cells: first..self.cells.len() as u32, outputs })
+    }
+
+    /// Begins one of the programs in a state.
+    fn begin(&mut self, side: &Side<'_>, state: &[u64], asked: &mut Asked) {
+        let times = (side.program.period.max(1), together(side.program));
+        for cell in side.cells.clone() {
+            let most = self.most.get(&cell).map_or(i128::MAX, |&most| i128::from(most));
+            let Self { cells, .. } = self;
+            let cell = &mut cells[cell as usize];
+            let number = match &cell.holds {
+                // Whether a fault has stopped it.
+                Holds::Other => Some(i128::from(state[0] != 0)),
+                holds => holds.number(state, most, times),
+            };
+            match (number, &cell.holds) {
+                (Some(number), _) => cell.initial = number as u64 & cell.of.mask(),
+                // It runs with the preset of the other program.
+                (None, Holds::Count(counted)) => asked.want(side, counted.start()),
+                (None, _) => {}
+            }
+        }
+    }
+
+    /// Lets the new program take over the state of the old one before any scan; whether it has, or does in this scan.
+    fn take_over(&mut self, both: &mut Both<'_>, asked: &mut Asked) -> Result<Term, InTheWay> {
+        let change = self.input(Self::CHANGE.to_owned(), Elementary::Bool, None);
+        let known = self.cell(Self::CHANGED.to_owned(), Elementary::Bool, 0);
+        let before = self.cells[known as usize].term;
+        let changed = self.terms.or(before, change);
+        self.cells[known as usize].next = changed;
+        let mut replaced: BTreeMap<Term, Term> = BTreeMap::new();
+        let mut failed = None;
+        for cell in both.new.cells.clone() {
+            let (term, of, initial) = {
+                let cell = &self.cells[cell as usize];
+                (cell.term, cell.of, cell.initial)
+            };
+            let begins = match self.begun(cell, both, asked) {
+                Ok(begins) => begins,
+                Err(why) => {
+                    let is_read = !matches!(self.cells[cell as usize].holds, Holds::Value(..))
+                        || self.seen.contains(&cell);
+                    let name = self.cells[cell as usize].name.clone();
+                    let name = name.trim_start_matches(NEW).to_owned();
+                    failed = failed.or(is_read.then_some(InTheWay::Value { name, why }));
+                    self.terms.constant(of, initial)
+                }
+            };
+            let read = self.terms.choose(before, term, begins);
+            replaced.insert(term, read);
+        }
+        let [observed, shown] = both.named;
+        let cells: Vec<u32> = both.new.cells.clone().collect();
+        let mut roots: Vec<Term> =
+            cells.iter().map(|&cell| self.cells[cell as usize].next).collect();
+        roots.extend(self.observed[observed..].iter().map(|(_, term)| *term));
+        roots.extend(self.shown[shown..].iter().map(|(_, term)| *term));
+        let names: Vec<String> = both.new.outputs.points.keys().cloned().collect();
+        roots.extend(names.iter().map(|name| both.new.outputs.points[name]));
+        let terms = self.terms.replaced(&roots, |variable, term| match variable {
+            Variable::Cell(_) => replaced.get(&term).copied().unwrap_or(term),
+            Variable::Input(_) => term,
+        });
+        let mut terms = terms.into_iter();
+        for (cell, next) in cells.into_iter().zip(terms.by_ref()) {
+            let kept = self.cells[cell as usize].term;
+            self.cells[cell as usize].next = self.terms.choose(changed, next, kept);
+        }
+        let named = self.observed[observed..].iter_mut().chain(&mut self.shown[shown..]);
+        for ((_, term), new) in named.zip(terms.by_ref()) {
+            *term = new;
+        }
+        both.new.outputs.points.extend(names.into_iter().zip(terms));
+        match failed {
+            Some(failed) => Err(failed),
+            None => Ok(changed),
+        }
+    }
+
+    /// What a cell of the new program has at the switch; or what about it is not followed, which may be because more is asked first.
+    fn begun(&mut self, cell: u32, both: &Both<'_>, asked: &mut Asked) -> Begun {
+        let Both { old, new, origins, .. } = both;
+        let holds = self.cells[cell as usize].holds.clone();
+        let initial = |system: &mut Self| {
+            let cell = &system.cells[cell as usize];
+            let (of, initial) = (cell.of, cell.initial);
+            system.terms.constant(of, initial)
+        };
+        let most = self.most.get(&cell).copied();
+        match holds {
+            // Whether a fault has stopped it.
+            Holds::Other => Ok(self.cells[old.cells.start as usize].term),
+            Holds::Scans => Ok(self.held(old, |holds| matches!(holds, Holds::Scans))?),
+            Holds::Phase if together(new.program) == 1 => Ok(initial(self)),
+            Holds::Phase if together(new.program) == together(old.program) => {
+                self.held(old, |holds| matches!(holds, Holds::Phase))
+            }
+            Holds::Phase => Err("counts the scans of tasks with other intervals"),
+            Holds::Clock => {
+                let clock = self.held(old, |holds| matches!(holds, Holds::Clock));
+                match clock.ok().filter(|&clock| self.reaches(clock, most)) {
+                    Some(clock) => Ok(self.up_to(clock, most)),
+                    None => self.time(old, most),
+                }
+            }
+            Holds::Age(address) => match origins.get(&address) {
+                None if new.program.initial_state()[(address / 64) as usize] == 0 => {
+                    self.time(old, most)
+                }
+                None => Err("is a moment that only the new program has"),
+                Some(origin) => {
+                    let from = origin.before;
+                    let age = self.held(
+                        old,
+                        |holds| matches!(holds, Holds::Age(address) if *address == from),
+                    );
+                    let age = age.inspect_err(|_| {
+                        self.want_count(old, from, asked);
+                    })?;
+                    if !self.reaches(age, most) {
+                        let least = most.unwrap_or(i64::MAX);
+                        asked.least.insert((OLD.to_owned(), from), least);
+                        return Err("is a moment that is longer ago than the old program asks");
+                    }
+                    Ok(self.up_to(age, most))
+                }
+            },
+            Holds::Count(counted) => {
+                let Some(origin) = origins.get(&counted.start()) else {
+                    return Ok(initial(self));
+                };
+                let from = origin.before;
+                let same = |holds: &Holds| match holds {
+                    Holds::Count(other) => other.start() == from && other.counts_as(&counted),
+                    _ => false,
+                };
+                self.held(old, same).inspect_err(|_| {
+                    asked.want(new, counted.start());
+                    self.want_count(old, from, asked);
+                })
+            }
+            Holds::Value(address, of) => {
+                let Some(origin) = origins.get(&address) else {
+                    return Ok(initial(self));
+                };
+                if !origin.is_same {
+                    return Err("has another type in the new program");
+                }
+                let from = origin.before;
+                let same = |holds: &Holds| matches!(holds, Holds::Value(at, _) if *at == from);
+                let value = self.held(old, same).inspect_err(|_| {
+                    if !self.want_count(old, from, asked) {
+                        asked.want(old, from);
+                    }
+                })?;
+                if self.terms.of(value) != of {
+                    return Err("has another type in the new program");
+                }
+                if self.most_of(value).is_some() && !self.reaches(value, most) {
+                    return Err("is a time that is longer than the old program asks");
+                }
+                Ok(self.up_to(value, most))
+            }
+        }
+    }
+
+    /// The cell of a program that holds something, before a scan.
+    fn held(&self, side: &Side<'_>, what: impl Fn(&Holds) -> bool) -> Begun {
+        let cells = &self.cells[side.cells.start as usize..side.cells.end as usize];
+        let found = cells.iter().find(|cell| what(&cell.holds));
+        found.map(|cell| cell.term).ok_or("is kept by the old program in another way")
+    }
+
+    /// Asks for a timer of a program to be followed through its body, if it is counted and keeps what is at an address; whether it is.
+    fn want_count(&self, side: &Side<'_>, address: u64, asked: &mut Asked) -> bool {
+        let cells = &self.cells[side.cells.start as usize..side.cells.end as usize];
+        let mut starts = cells.iter().filter_map(|cell| match &cell.holds {
+            Holds::Count(counted) if counted.keeps(address) => Some(counted.start()),
+            _ => None,
+        });
+        let start = starts.next();
+        start.into_iter().for_each(|start| asked.want(side, start));
+        start.is_some()
+    }
+
+    /// Where the cell of a term stops, if it does.
+    fn most_of(&self, term: Term) -> Option<i64> {
+        match self.terms.node(term) {
+            crate::term::Node::Variable(Variable::Cell(cell)) => self.most.get(cell).copied(),
+            _ => None,
+        }
+    }
+
+    /// Whether the cell of a term counts a time as far as another one does.
+    fn reaches(&self, term: Term, most: Option<i64>) -> bool {
+        match (self.most_of(term), most) {
+            (None, _) => true,
+            (Some(_), None) => false,
+            (Some(counted), Some(most)) => counted >= most,
+        }
+    }
+
+    fn up_to(&mut self, time: Term, most: Option<i64>) -> Term {
+        match most {
+            Some(most) => self.stopped_at(time, most),
+            None => time,
+        }
+    }
+
+    /// `TIME()` of the old program, up to where a cell of the new one stops.
+    fn time(&mut self, old: &Side<'_>, most: Option<i64>) -> Begun {
+        let stops = !self.terms.is(self.cells[old.cells.start as usize].next, false);
+        let (Some(most), false) = (most, stops) else {
+            return Err("depends on the time since the start");
+        };
+        let cell = self.cell("time".to_owned(), Elementary::Time, 0);
+        let time = self.cells[cell as usize].term;
+        let period = self.terms.constant(Elementary::Time, old.program.period as u64);
+        let add = Operation::Add(Elementary::Time);
+        let more = self.terms.apply(add, Elementary::Time, &[time, period]);
+        self.cells[cell as usize].next = self.stopped_at(more, most);
+        Ok(time)
+    }
+
+    /// Names where the outputs differ.
+    fn observe_differences(&mut self, both: &Both<'_>, changed: Term) {
+        self.wanted.clear();
+        self.numbers.clear();
+        self.observed.push((Self::CHANGED.to_owned(), changed));
+        let stopped = self.terms.boolean(false);
+        for point in &both.new.program.outputs {
+            let of = |side: &Side<'_>| side.outputs.points.get(&point.name).copied();
+            let [old, new] = [&both.old, &both.new].map(|side| of(side).unwrap_or(stopped));
+            let apart = match point.of {
+                Elementary::Bool => {
+                    let xor = Operation::Xor(Elementary::Bool);
+                    self.terms.apply(xor, Elementary::Bool, &[old, new])
+                }
+                _ => self.terms.compare(Comparison::NotEqual, old, new),
+            };
+            let differs = self.terms.and(changed, apart);
+            self.observed.push((Self::differs(&point.name), differs));
+        }
+    }
+}
+
+impl Asked {
+    /// Asks for a cell of the variable at an address.
+    fn want(&mut self, side: &Side<'_>, address: u64) {
+        if let Some(part) = side.program.part_at(address) {
+            self.wanted.insert(format!("{}{}", side.prefix, part.name));
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The plan of an online change: which outputs can differ.
+
+mod ladders;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::{empty_folder, understudy, understudy_in};
+
+const OLD: &str = "examples/online-change/cluster.toml";
+const NEW: &str = "examples/online-change/new/cluster.toml";
+
+/// The verdict about an output of the only program that changes.
+fn verdict<'a>(json: &'a Value, output: &str) -> &'a Value {
+    let outputs = json["result"]["differences"][0]["outputs"].as_array();
+    let mut outputs = outputs.into_iter().flatten();
+    outputs.find(|told| told["output"] == output).unwrap_or_else(|| panic!("{output}: {json}"))
+}
+
+fn write(folder: &Path, name: &str, text: &str) {
+    let cluster = "[cluster]\nname = \"cell\"\nperiod = \"10ms\"\nsecurity = \"off\"\n\n[[controller]]\nname = \"one\"\nladder = \"one.st\"\n\n\
+         [[remote_io]]\ncontroller = \"one\"\n";
+    let folder = folder.join(name);
+    fs::create_dir_all(&folder).expect("a folder");
+    fs::write(folder.join("cluster.toml"), cluster).expect("a cluster");
+    fs::write(folder.join("one.st"), text).expect("a program");
+}
+
+#[test]
+fn the_plan_shows_a_run_in_which_an_output_differs() {
+    let answer = understudy(&["change", OLD, NEW, "--json"]);
+    assert_eq!(answer.status, 0, "{}", answer.errors);
+    let json = answer.json();
+    let running = verdict(&json, "running");
+    assert_eq!(running["verdict"], "differs", "{json}");
+    let signals = &running["run"]["signals"];
+    let last = running["run"]["differs_in_scan"].as_u64().expect("a scan") as usize;
+    assert_ne!(signals["old.running"][last], signals["new.running"][last], "{running}");
+    assert_eq!(signals["stop"][last], true, "{running}");
+    let text = understudy(&["change", OLD, NEW]).output;
+    assert!(text.contains("`running` can differ"), "{text}");
+}
+
+#[test]
+fn what_is_equal_is_proved_and_a_longer_delay_differs_only_later() {
+    let folder = empty_folder("change_equal");
+    let program = |condition: &str, delay: &str| {
+        format!(
+            "PROGRAM one\n VAR_INPUT start, stop : BOOL; END_VAR\n VAR_OUTPUT valve, lamp : BOOL; END_VAR\n VAR wait : TON; END_VAR\n\
+             wait(IN := start, PT := {delay});\n valve := {condition};\n lamp := wait.Q AND NOT stop;\nEND_PROGRAM\n"
+        )
+    };
+    write(&folder, "old", &program("start AND NOT stop", "T#50ms"));
+    write(&folder, "same", &program("NOT (NOT start OR stop)", "T#50ms"));
+    write(&folder, "longer", &program("start AND NOT stop", "T#70ms"));
+    let json =
+        understudy_in(&folder, &["change", "old/cluster.toml", "same/cluster.toml", "--json"])
+            .json();
+    for output in ["valve", "lamp"] {
+        assert_eq!(verdict(&json, output)["verdict"], "equal", "{json}");
+    }
+    let json =
+        understudy_in(&folder, &["change", "old/cluster.toml", "longer/cluster.toml", "--json"])
+            .json();
+    assert_eq!(verdict(&json, "valve")["verdict"], "equal", "{json}");
+    let lamp = verdict(&json, "lamp");
+    assert_eq!(lamp["verdict"], "differs", "{json}");
+    assert_eq!(
+        lamp["run"]["differs_in_scan"], 5,
+        "the old delay is over in the sixth scan: {lamp}"
+    );
+}
+
+#[test]
+fn what_is_not_followed_is_undecided_with_the_variable() {
+    let folder = empty_folder("change_numbers");
+    let program = |factor: &str| {
+        format!(
+            "PROGRAM one\n VAR_INPUT level : REAL; END_VAR\n VAR_OUTPUT high, low : BOOL; END_VAR\n VAR mean : REAL; END_VAR\n\
+             mean := mean * 0.9 + level * {factor};\n high := mean > 80.0;\n low := level < 10.0;\nEND_PROGRAM\n"
+        )
+    };
+    write(&folder, "old", &program("0.1"));
+    write(&folder, "new", &program("0.10001"));
+    let answer = understudy_in(
+        &folder,
+        &["change", "old/cluster.toml", "new/cluster.toml", "--json", "--budget", "5s"],
+    );
+    assert_eq!(answer.status, 0, "{}", answer.errors);
+    let json = answer.json();
+    assert_eq!(verdict(&json, "low")["verdict"], "equal", "{json}");
+    let high = verdict(&json, "high");
+    assert_ne!(high["verdict"], "equal", "{json}");
+    if high["verdict"] == "undecided" {
+        assert!(high["reason"].as_str().is_some_and(|why| why.contains("level")), "{high}");
+    }
+}
