@@ -477,6 +477,7 @@ impl Simulation {
     fn send(&mut self, frame: Arc<Frame>) {
         if let Member::Station(station) = frame.header.sender {
             self.unannounced.remove(station);
+            self.knowable.sent(station, frame.header.moment);
         }
         let Header { configuration: own, prepared, .. } = frame.header;
         if self.parts.are_right(Configurations { own, prepared }) {

@@ -163,13 +163,13 @@ impl Simulation {
     }
 
     /// A station that has the state of a program, where all stations that could have another one whose outputs were applied have it too, and
-    /// receive each other. What two remote I/Os of a program know of each other is not followed: none is named there.
+    /// receive each other. Where a cluster has several programs, none is named: what a station knows by the
+    /// controllers of the others is not followed here.
     fn holder_in_doubt(&self, program: ProgramId, moment: Moment) -> Option<StationId> {
-        let settings = &self.parts.remote_ios[program.index()];
-        if settings.pair.is_some() {
+        if self.remote_ios.len() > 1 {
             return None;
         }
-        let agreement = &settings.agreement;
+        let agreement = &self.parts.remote_ios[program.index()].agreement;
         let known_after = agreement.flag_after + agreement.history as u32 + CYCLES_TO_TELL;
         let candidates = self.candidates(program).collect();
         let in_doubt = self.knowable.in_doubt(program, candidates, (moment, known_after));

@@ -11,6 +11,8 @@ pub(super) struct Knowable {
     programs: Vec<Synchronised>,
     /// For each station, the newest cycle in which a frame of another member reached it.
     received_in: Vec<Moment>,
+    /// For each station, the newest cycle in which it has sent: a frame of an earlier one is late for it.
+    sent_in: Vec<Moment>,
 }
 
 /// Stations that had the state of a program when outputs of it were last applied.
@@ -31,7 +33,14 @@ impl Knowable {
             crashed: StationSet::EMPTY,
             isolated: StationSet::EMPTY,
         };
-        Self { programs: vec![none; programs], received_in: vec![Moment::default(); stations] }
+        let never = vec![Moment::default(); stations];
+        Self { programs: vec![none; programs], received_in: never.clone(), sent_in: never }
+    }
+
+    /// A station sends a frame of a cycle.
+    pub(super) fn sent(&mut self, station: StationId, moment: Moment) {
+        let newest = &mut self.sent_in[station.index()];
+        *newest = moment.max(*newest);
     }
 
     /// A frame of another member reaches a station.
@@ -39,7 +48,11 @@ impl Knowable {
         if !matches!(frame.body, Body::Sample(_) | Body::Turn(_) | Body::Join(_)) {
             return;
         }
-        let (moment, newest) = (frame.header.moment, &mut self.received_in[station.index()]);
+        let moment = frame.header.moment;
+        if moment < self.sent_in[station.index()] {
+            return;
+        }
+        let newest = &mut self.received_in[station.index()];
         if moment > newest.plus(1) {
             self.programs.iter_mut().for_each(|it| it.isolated.insert(station));
         }
@@ -148,6 +161,22 @@ mod tests {
         let candidates = set(&(0..stations).collect::<Vec<_>>());
         let in_doubt = knowable.in_doubt(PROGRAM, candidates, (moment(ASKED), 9));
         assert_eq!(in_doubt, set(expected), "{stations} {crashes:?} {received:?}");
+    }
+
+    /// A frame that comes after the station has sent in a later cycle does not count.
+    #[test]
+    fn a_late_frame_reaches_no_station() {
+        let mut knowable = Knowable::new(3, 1);
+        let all: StationSet = (0..3).map(StationId).collect();
+        let near = all.without(StationSet::only(StationId(2)));
+        for (cycle, sent) in [(1, 1), (2, 2), (3, 4), (4, 4)] {
+            knowable.applied(PROGRAM, near, near);
+            for station in near.iter() {
+                knowable.sent(station, moment(sent));
+                knowable.reached(station, &frame(cycle));
+            }
+        }
+        assert_eq!(knowable.in_doubt(PROGRAM, all, (moment(5), 9)), StationSet::EMPTY);
     }
 
     #[test]
