@@ -179,9 +179,13 @@ impl Found {
             (
                 "  closed form, repair alone",
                 format!(
-                    "{} h, {}: those cycles take {:.2} % from it",
+                    "{} h, {}: those cycles{} take {:.2} % from it",
                     grouped(self.mttf_closed_form_hours),
                     verdict(self.closed_form_agrees).to_lowercase(),
+                    match &self.parts {
+                        Some(parts) if parts.unmasked > 0 => " and failed switchovers",
+                        _ => "",
+                    },
                     -100.0 * self.own_time_bias
                 ),
             ),

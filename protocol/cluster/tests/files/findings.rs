@@ -555,7 +555,7 @@ fn twins() {
     for key in ["author = true", "direct = \"10.0.1.61:7450\""] {
         let found = check(&named(&format!(", {key}")), &tcp, "");
         assert!(
-            found.contains("U0205"),
+            found.contains("U0202"),
             "neither is configured as author, and no link is direct: {found}"
         );
     }
