@@ -562,7 +562,7 @@ fn twins() {
     // A simulated plant must wait until the twin has taken over.
     let plant = |watchdog: u32| {
         format!(
-            "[[plant]]\nname = \"arm\"\ncontroller = \"robot\"\nmodel = \"robot\"\nwatchdog_cycles = {watchdog}\n"
+            "[[plant]]\nname = \"arm\"\ncontroller = \"robot\"\nladder = \"belt.ladder\"\nsignals = {{ lots = \"lost\" }}\nwatchdog_cycles = {watchdog}\n"
         )
     };
     for (after, least) in [(1, 4), (3, 6)] {
