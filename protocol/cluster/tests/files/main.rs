@@ -13,4 +13,5 @@ mod press_cell;
 mod retention;
 mod schema;
 mod template;
+mod twins;
 mod undriven;
