@@ -99,6 +99,10 @@ fn hits<'a>(text: &str, banned: &'a [Phrase], allowed: &[Phrase]) -> Vec<(usize,
         if !is_letter(letters[at]) || (at > 0 && is_letter(letters[at - 1])) {
             continue;
         }
+        // The name of an option is not prose.
+        if letters[..at].ends_with(&['-', '-']) {
+            continue;
+        }
         let ends = allowed.iter().filter_map(|phrase| phrase.end(&letters, at));
         allowed_until = ends.chain([allowed_until]).max().unwrap_or_default();
         if at < allowed_until {

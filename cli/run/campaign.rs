@@ -75,10 +75,10 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "K/N", default_value = "1/1", requires = "seed")]
     shard: Shard,
     /// Run seeds that have no findings in this folder, without end; any number of processes share it
-    #[arg(long, value_name = "STORE", conflicts_with_all = ["seed", "shard"])]
+    #[arg(long, id = "STORE", conflicts_with_all = ["seed", "shard"])]
     forever: Option<PathBuf>,
     /// Seeds 0 to N-1 only: the campaign ends when all of them are in the store
-    #[arg(long, value_name = "N", requires = "forever", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", requires = "STORE", value_parser = clap::value_parser!(u64).range(1..))]
     seeds: Option<u64>,
     /// The spares of the cluster wake when a station has been flagged for N cycles, and retire when the cluster has been complete for as many;
     /// without it they do not wake
