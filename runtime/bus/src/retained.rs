@@ -381,9 +381,8 @@ impl Turn {
         }
         content.extend_from_slice(bytes);
         if self.is_halved {
-            for left in self.files.paths().iter().filter(|left| left.exists()) {
-                std::fs::remove_file(left)?;
-            }
+            let paths = self.files.paths();
+            paths.iter().filter(|left| left.exists()).try_for_each(std::fs::remove_file)?;
             self.damaged.clear();
             self.is_halved = false;
         }
