@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     /// Cycles of a rehearsal: the newest recorded ones
     #[arg(long, value_name = "CYCLES", default_value_t = 1000, value_parser = value_parser!(u64).range(1..=1_000_000))]
     cycles: u64,
-    /// Rehearse with the next cycles of a run that goes on, in place of the recorded ones
+    /// Rehearse with the next cycles of a running cluster, in place of the recorded ones
     #[arg(long)]
     live: bool,
     /// Scans after which a rehearsed program takes the state of the running one over anew

@@ -8,10 +8,10 @@ use understudy_view::{Bounds, Following, Model, Rehearsal, Run};
 use super::Arguments;
 use crate::answer::{Answer, Status};
 
-/// Between two looks at a run that goes on.
+/// Time between two reads of a running cluster.
 const AGAIN: Duration = Duration::from_millis(200);
 
-/// Cycles of which states are kept beside those that are asked for: some are not complete.
+/// Cycles of which states are kept in addition to those that are asked for: some are not complete.
 const MORE: usize = 64;
 
 /// Rehearses over the newest recorded cycles of a run, or over those that come.
