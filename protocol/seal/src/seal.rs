@@ -67,7 +67,7 @@ impl Seal {
         Self { number, ..self }
     }
 
-    /// Whether it is time to ask for a further life: from [`RESERVE`] frames before the end on, at intervals, so that a life that cannot begin is not
+    /// Whether it is time to ask for a further life: from about a million frames before the end on, at intervals, so that a life that cannot begin is not
     /// asked for with every frame.
     pub fn needs_life(&self) -> bool {
         let left = u64::MAX - self.number;
