@@ -32,17 +32,41 @@ struct Last {
 /// The same as it is written: JSON has no numbers as keys.
 #[derive(Serialize, Deserialize)]
 struct Written {
-    epochs: Vec<(Epoch, i128)>,
+    epochs: Vec<(Epoch, Offset)>,
     newest: Option<(Moment, i64)>,
     remote_ios: Vec<(ProgramId, Last)>,
 }
 
 impl From<Numbering> for Written {
     fn from(numbering: Numbering) -> Self {
+        let offsets = numbering.offsets.into_iter();
         Self {
-            epochs: numbering.offsets.into_iter().collect(),
+            epochs: offsets.map(|(epoch, offset)| (epoch, offset.into())).collect(),
             newest: numbering.newest,
             remote_ios: numbering.remote_ios.into_iter().collect(),
+        }
+    }
+}
+
+/// An offset as it is written: records of a journal hold no number with more than 64 bits.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Offset {
+    Number(i64),
+    Text(String),
+}
+
+impl From<i128> for Offset {
+    fn from(offset: i128) -> Self {
+        i64::try_from(offset).map_or_else(|_| Self::Text(offset.to_string()), Self::Number)
+    }
+}
+
+impl Offset {
+    fn value(&self) -> i128 {
+        match self {
+            Self::Number(offset) => i128::from(*offset),
+            Self::Text(offset) => offset.parse().unwrap_or_default(),
         }
     }
 }
@@ -56,7 +80,9 @@ impl From<Written> for Numbering {
             (program, last)
         });
         Self {
-            offsets: epochs.map(|(epoch, offset)| (epoch, bounded_offset(offset))).collect(),
+            offsets: epochs
+                .map(|(epoch, offset)| (epoch, bounded_offset(offset.value())))
+                .collect(),
             newest: written.newest.map(|(moment, number)| (moment, bounded(number))),
             remote_ios: remote_ios.collect(),
         }
@@ -194,6 +220,29 @@ mod tests {
             let moment = Moment { epoch: Epoch(epoch), cycle: Cycle(cycle) };
             let number = numbering.deadline(ProgramId(remote_io), moment, idle);
             assert_eq!(number, expected, "{remote_io} at {moment} in {rows:?}");
+        }
+    }
+
+    /// A record holds it within an enum that serde tells apart by a tag.
+    #[test]
+    fn it_is_read_as_it_was_written() {
+        #[derive(Serialize, Deserialize)]
+        #[serde(tag = "event")]
+        enum Tagged {
+            Of { numbering: Numbering },
+        }
+        for cycle in [0, 5, 1 << 53, u64::MAX - 3] {
+            let mut numbering = Numbering::default();
+            numbering.deadline(
+                ProgramId(0),
+                Moment { epoch: Epoch(1), cycle: Cycle(cycle) },
+                false,
+            );
+            numbering.deadline(ProgramId(1), Moment { epoch: Epoch(2), cycle: Cycle(0) }, false);
+            let text = serde_json::to_string(&Tagged::Of { numbering: numbering.clone() });
+            let read = serde_json::from_str(&text.expect("JSON"));
+            let Tagged::Of { numbering: again } = read.expect("what was written");
+            assert_eq!(again, numbering, "{cycle}");
         }
     }
 
