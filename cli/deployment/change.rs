@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         return Err(Answer::failed(Status::BadInput, "U0630", message.to_owned()));
     }
     if arguments.step == Step::Rehearse {
-        return rehearsal::rehearse(arguments, &before, &texts);
+        return rehearsal::rehearse(arguments, run.as_ref(), &before, &texts);
     }
     let members = Members::of(arguments, &before)?;
     match arguments.step {
@@ -214,6 +214,7 @@ fn finish(
     }
 }
 
+/// Before members or a run are asked again.
 #[allow(clippy::disallowed_methods, reason = "a person waits, and members continue meanwhile")]
 fn pause() {
     std::thread::sleep(AGAIN);

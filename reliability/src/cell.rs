@@ -82,7 +82,7 @@ pub fn cells_text(rows: &[CellRow]) -> String {
     text
 }
 
-/// The same cell with so many networks, and with or without a twin for each remote I/O.
+/// The same cell with this number of networks, and with or without a twin for each remote I/O.
 fn redundant(options: &Options, networks: u32, has_twins: bool) -> Options {
     let mut changed = options.clone();
     if let Some(them) = &mut changed.remote_ios {

@@ -28,7 +28,7 @@ const ROUND: u64 = 1_000;
 const ROUNDS: u64 = 100;
 const FIRST_ROUNDS: u64 = 3;
 
-/// A program with so many inputs and outputs.
+/// A program with this number of inputs and outputs.
 fn with(width: u16) -> Settings {
     let bits = usize::from(width);
     let operator_input = OperatorInput {

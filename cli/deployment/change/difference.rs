@@ -109,15 +109,23 @@ fn outcome(
     state: Option<&[u64]>,
     bounds: Bounds<'_>,
 ) -> Result<Vec<OfOutput>, String> {
-    let origins = origins(old, new);
-    let states = state.map(|state| states_at_change(old, new, state));
-    let switch = match &states {
-        Some([before, after]) => Switch::Now { before, after },
-        None => Switch::AnyScan { origins: &origins },
+    let (states, taken);
+    let switch = match state {
+        Some(state) => {
+            states = states_at_change(old, new, state);
+            let [before, after] = &states;
+            Switch::Now { before, after }
+        }
+        None => {
+            if let Some(name) = nearest_of(old, new) {
+                return Err(format!(
+                    "`{name}` can have a value that the new program does not have"
+                ));
+            }
+            taken = origins(old, new);
+            Switch::AnyScan { origins: &taken }
+        }
     };
-    if let (None, Some(name)) = (&states, nearest_of(old, new)) {
-        return Err(format!("`{name}` can have a value that the new program does not have"));
-    }
     let difference = Difference::between(old.typed(), new.typed(), switch);
     let difference = difference.map_err(|error| error.to_string())?;
     let inexact = difference.inexact().map(|inexact| inexact.to_string());

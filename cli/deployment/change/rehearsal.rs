@@ -1,15 +1,10 @@
 //! `understudy change … rehearse`: what the new programs would have done in a run.
 
-use std::time::Duration;
-
 use understudy_cluster::{ChangeTexts, Cluster};
 use understudy_view::{Bounds, Following, Model, Rehearsal, Run};
 
-use super::Arguments;
+use super::{Arguments, pause};
 use crate::answer::{Answer, Status};
-
-/// Time between two reads of a running cluster.
-const AGAIN: Duration = Duration::from_millis(200);
 
 /// Cycles of which states are kept in addition to those that are asked for: some are not complete.
 const MORE: usize = 64;
@@ -17,14 +12,14 @@ const MORE: usize = 64;
 /// Rehearses over the newest recorded cycles of a run, or over those that come.
 pub(super) fn rehearse(
     arguments: &Arguments,
+    run: Option<&Run>,
     before: &Cluster,
     texts: &ChangeTexts,
 ) -> Result<Answer, Answer> {
-    if !arguments.before.is_dir() {
+    let Some(run) = run else {
         let message = "a rehearsal needs the directory of a run in place of the first cluster file, such as `runs/latest`";
         return Err(Answer::failed(Status::BadInput, "U0614", message.to_owned()));
-    }
-    let run = Run::open(&arguments.before)?;
+    };
     let change = texts
         .load(before)
         .map_err(|error| Answer::failed(Status::BadInput, "U0631", error.to_string()))?;
@@ -47,7 +42,7 @@ pub(super) fn rehearse(
         rehearsals.iter().all(|(_, it)| it.found().cycles >= arguments.cycles)
     };
     if arguments.live {
-        let (mut model, mut following) = Following::of(&run, bounds);
+        let (mut model, mut following) = Following::of(run, bounds);
         following.poll(&mut |found| model.take_found(found));
         // What is there already is not rehearsed but for the newest cycle, whose state the new program takes over.
         take(&model, 1);
@@ -70,9 +65,4 @@ pub(super) fn rehearse(
     }
     let answer = Answer::done(text.trim_end(), serde_json::json!({ "rehearsed": found }));
     Ok(answer.with_status(if is_equal { Status::Done } else { Status::Failed }))
-}
-
-#[allow(clippy::disallowed_methods, reason = "a person waits for cycles of the cluster")]
-fn pause() {
-    std::thread::sleep(AGAIN);
 }

@@ -28,7 +28,7 @@ pub struct BillRow {
 /// A price.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Price {
-    /// In hundredths of the currency.
+    /// The price in hundredths of the currency.
     pub hundredths: u64,
     /// The currency.
     pub currency: String,

@@ -2,7 +2,7 @@
 
 mod registers;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use understudy_logic::Variable as Bit;
 use understudy_typed::Program;
@@ -30,6 +30,8 @@ pub struct Layout {
     cells: Vec<(Holds, Extent)>,
     /// For each register its cell, and the weight of its bit.
     registers: Vec<(usize, i128)>,
+    /// For each address of the state that a cell tells this cell: of a timer and of its output the latter.
+    told: HashMap<u64, usize>,
 }
 
 impl Layout {
@@ -51,6 +53,12 @@ impl Layout {
             (place, held.weight)
         });
         let registers = registers.collect();
+        let mut told: HashMap<u64, usize> = HashMap::new();
+        for (place, (holds, _)) in cells.iter().enumerate() {
+            if let Holds::Count(counted) = holds {
+                told.extend(counted.addresses().map(|address| (address, place)));
+            }
+        }
         // What never changes has no register, and the circuit has its one value.
         for &cell in system.seen.iter().filter(|cell| !places.contains_key(cell)) {
             let cell = &system.cells[cell as usize];
@@ -58,17 +66,18 @@ impl Layout {
             let Holds::Value(address, _) = cell.holds else {
                 continue;
             };
-            let of_timer = cells.iter().any(|(holds, _): &(Holds, Extent)| match holds {
-                Holds::Count(counted) => counted.keeps(address),
-                _ => false,
-            });
-            if extent.low == extent.high && !of_timer {
+            if extent.low == extent.high && !told.contains_key(&address) {
                 cells.push((cell.holds.clone(), extent));
+            }
+        }
+        for (place, (holds, _)) in cells.iter().enumerate() {
+            if let Holds::Value(address, _) | Holds::Age(address) = holds {
+                told.insert(*address, place);
             }
         }
         let initial = program.initial_state();
         let together = together(program);
-        Self { initial, period: program.period.max(1), together, cells, registers }
+        Self { initial, period: program.period.max(1), together, cells, registers, told }
     }
 
     /// The registers that a warm start keeps, packed; see [`Program::retentive_mask`].

@@ -44,23 +44,13 @@ pub enum Unnamed {
     SeveralEdges(String),
 }
 
-/// What a state before tells, and what of it is read: see [`Told`].
-struct Held<'a> {
-    known: Box<dyn Fn(u64) -> bool + 'a>,
-    read: Box<dyn Fn(u64) -> bool + 'a>,
-}
-
-impl Held<'_> {
-    fn as_told(&self) -> Told<'_> {
-        Told { is_known: &*self.known, is_read: &*self.read }
-    }
-}
-
 /// Rungs and their circuit.
 #[derive(Debug, Clone)]
 struct Rungs {
     ladder: LadderProgram,
     circuit: Circuit,
+    /// The circuit as stations execute it.
+    executable: Executable,
     /// What its registers are in the state of the program.
     layout: Layout,
     /// The registers that a warm start keeps, packed.
@@ -80,7 +70,8 @@ impl Code {
         let Exact { circuit, layout } = circuit(&typed)?;
         let circuit = circuit.named(ladder.name.as_str());
         let retentive = layout.retentive_mask(&typed);
-        let rungs = Rungs { ladder, circuit, layout, retentive };
+        let executable = Executable::from(&circuit).keeping(retentive.clone());
+        let rungs = Rungs { ladder, circuit, executable, layout, retentive };
         Ok(Self { typed, source, body: Body::Rungs(Box::new(rungs)) })
     }
 
@@ -142,7 +133,7 @@ impl Code {
     /// As stations execute it.
     pub fn executable(&self) -> Executable {
         match &self.body {
-            Body::Rungs(rungs) => Executable::from(&rungs.circuit).keeping(rungs.retentive.clone()),
+            Body::Rungs(rungs) => rungs.executable.clone(),
             Body::Text => self.typed.as_ref().into(),
         }
     }
@@ -152,12 +143,11 @@ impl Code {
     /// # Panics
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64]) -> CarriedState {
-        let told = self.told(before);
-        let mut carried =
-            self.typed.carried(&before.typed, &before.typed_state(state), told.as_told());
-        if let Some(layout) = self.layout() {
-            let executable = self.executable();
-            let registers = layout.registers(&self.typed, &carried.state, executable.initial());
+        let state = before.typed_state(state);
+        let mut carried = self.told(before, |told| self.typed.carried(&before.typed, &state, told));
+        if let Body::Rungs(rungs) = &self.body {
+            let initial = rungs.executable.initial();
+            let registers = rungs.layout.registers(&self.typed, &carried.state, initial);
             carried.paths.retain(|path| !registers.lost.contains(&path.path));
             carried.paths.extend(registers.lost.iter().map(|path| self.without_registers(path)));
             carried.state = registers.packed;
@@ -170,12 +160,14 @@ impl Code {
     /// # Panics
     /// As [`Self::carried`].
     pub(crate) fn changed(&self, before: &Self, state: &[u64], by: &Successor) -> Vec<u64> {
-        let changed = by.state(&before.typed_state(state), self.told(before).as_told());
-        match self.layout() {
-            Some(layout) => {
-                layout.nearest_registers(by.program(), &changed, self.executable().initial())
+        let state = before.typed_state(state);
+        let changed = self.told(before, |told| by.state(&state, told));
+        match &self.body {
+            Body::Rungs(rungs) => {
+                let initial = rungs.executable.initial();
+                rungs.layout.nearest_registers(by.program(), &changed, initial)
             }
-            None => changed,
+            Body::Text => changed,
         }
     }
 
@@ -184,7 +176,7 @@ impl Code {
         let successor = self.successor(before);
         let executable = before.executable();
         let state = before.typed_state(executable.initial());
-        let mut paths = successor.carried(&state, self.told(before).as_told()).paths;
+        let mut paths = self.told(before, |told| successor.carried(&state, told)).paths;
         // What no register holds is written before it is read: nothing of it begins anew, and nothing is lost.
         paths.retain(|path| match path.fate {
             Fate::New => self.holds(&path.path),
@@ -210,10 +202,9 @@ impl Code {
 
     /// Whether the states that stations hold have any of what a path stands for.
     fn holds(&self, path: &str) -> bool {
-        let (Some(layout), Some(part)) = (self.layout(), self.typed.part(path)) else {
-            return true;
-        };
-        (0..part.of.slots()).any(|slot| layout.holds(part.address + 64 * slot))
+        self.typed.part(path).is_none_or(|part| {
+            (0..part.of.slots()).any(|slot| self.holds_address(part.address + 64 * slot))
+        })
     }
 
     /// Whether the states that stations hold have the value at an address.
@@ -221,11 +212,12 @@ impl Code {
         self.layout().is_none_or(|layout| layout.holds(address))
     }
 
-    fn told<'a>(&'a self, before: &'a Self) -> Held<'a> {
-        let held = |layout: Option<&'a Layout>| {
-            move |address| layout.is_none_or(|layout| layout.holds(address))
-        };
-        Held { known: Box::new(held(before.layout())), read: Box::new(held(self.layout())) }
+    /// Asks with what the state before tells, and with what of it is read.
+    fn told<R>(&self, before: &Self, ask: impl FnOnce(Told<'_>) -> R) -> R {
+        ask(Told {
+            is_known: &|address| before.holds_address(address),
+            is_read: &|address| self.holds_address(address),
+        })
     }
 
     /// Why the states of this program cannot be those of a changed one; nothing where they can.

@@ -92,9 +92,14 @@ impl Counted {
         self.scans
     }
 
+    /// The addresses at which the timer keeps something.
+    pub(crate) fn addresses(&self) -> [u64; 5] {
+        self.kept(0, 0, 0).map(|(address, _)| address)
+    }
+
     /// Whether the timer keeps what is at an address.
     pub(crate) fn keeps(&self, address: u64) -> bool {
-        self.kept(0, 0, 0).iter().any(|(at, _)| *at == address)
+        self.addresses().contains(&address)
     }
 
     /// The count with which every later scan of the timer is that from what `stored` has at each address; none where it began in the future. One that is

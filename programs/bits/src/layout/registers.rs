@@ -56,10 +56,10 @@ impl Layout {
             let part = old.part(&name);
             let known = part.and_then(|part| match layout {
                 None => part.of.elementary().map(Extent::of),
-                Some(layout) => layout.cells.iter().find_map(|(holds, extent)| match holds {
-                    Holds::Value(address, _) => (*address == part.address).then_some(*extent),
+                Some(layout) => match &layout.cells[*layout.told.get(&part.address)?] {
+                    (Holds::Value(..), extent) => Some(*extent),
                     _ => None,
-                }),
+                },
             });
             if known.is_some_and(|known| !extent.covers(known)) {
                 narrowed.push(name);
@@ -98,11 +98,7 @@ impl Layout {
 
     /// Whether registers hold what is at an address of the state.
     pub fn holds(&self, address: u64) -> bool {
-        self.cells.iter().any(|(holds, _)| match holds {
-            Holds::Value(at, _) | Holds::Age(at) => *at == address,
-            Holds::Count(counted) => counted.keeps(address),
-            _ => false,
-        })
+        self.told.contains_key(&address)
     }
 
     /// The number of a cell in a state, which may be one that the program does not reach.
