@@ -29,7 +29,7 @@ use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Referee, Violation};
 use understudy_wire::{
-    Force, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationSet,
+    Force, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationSet, Time,
 };
 
 use crate::figure::Signals;
@@ -318,7 +318,7 @@ impl Account {
                 Happening::RemoteIo(event),
                 Some(member @ (Member::RemoteIo(program) | Member::Twin(program))),
             ) => {
-                self.remote_io(member, program, event);
+                self.remote_io(member, program, Time(record.at_ns), event);
                 if let RemoteIoEvent::Applied { moment, .. } = event
                     && let Some(number) = self.numbering.of(*moment)
                 {

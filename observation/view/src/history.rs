@@ -15,7 +15,8 @@ use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
 use understudy_typed::{Fault, Program as TypedProgram};
 use understudy_wire::{
-    Image, Lineage, Member, Moment, ProgramHash, ProgramId, Source, StationId, StationSet, Write,
+    Image, Lineage, Member, Moment, ProgramHash, ProgramId, Source, StationId, StationSet, Time,
+    Write,
 };
 
 use order::Order;
@@ -89,7 +90,7 @@ pub struct History {
     /// Whether steps have gone, or were never seen.
     cut: bool,
     /// The newest samples, while it is not known which state they belong to.
-    unplaced: VecDeque<Event>,
+    unplaced: VecDeque<(Time, Event)>,
     /// The state after a sample that is still to come.
     awaited: Option<(Moment, (Option<ProgramHash>, Lineage), Image)>,
     end: End,
@@ -252,16 +253,16 @@ impl History {
         if self.referee.standing().is_some() {
             return;
         }
-        let place = self.unplaced.iter().position(|it| is_of(it, moment));
+        let place = self.unplaced.iter().position(|(_, it)| is_of(it, moment));
         let Some(place) = place else {
             self.awaited = Some((moment, (changed, lineage), state.clone()));
             return;
         };
         self.referee.goes_on_from((changed, lineage), state.clone());
-        let later: Vec<Event> = self.unplaced.drain(..).skip(place + 1).collect();
+        let later: Vec<(Time, Event)> = self.unplaced.drain(..).skip(place + 1).collect();
         self.awaited = None;
-        for event in later {
-            let (sampled, _) = self.sample(self.by, &event);
+        for (at, event) in later {
+            let (sampled, _) = self.sample(self.by, at, &event);
             let mut steps = self.steps.iter_mut().rev();
             if let Some(step) = steps.find(|step| is_of(&event, step.moment)) {
                 step.sampled = sampled;
@@ -270,8 +271,13 @@ impl History {
     }
 
     /// Takes a sample; what it did, where the state before it is known, and what is wrong with it.
-    fn sample(&mut self, member: Member, event: &Event) -> (Option<Sampled>, Option<Violation>) {
-        let violation = self.referee.observe_from(member, event).err();
+    fn sample(
+        &mut self,
+        member: Member,
+        at: Time,
+        event: &Event,
+    ) -> (Option<Sampled>, Option<Violation>) {
+        let violation = self.referee.observe_from(member, at, event).err();
         let Event::Sampled { moment, inputs, before, change: None, .. } = event else {
             // The state before a change mark is one of another program than that which takes the sample.
             return (None, violation);
@@ -310,7 +316,7 @@ impl History {
     }
 
     /// Keeps a sample until it is known which state it belongs to.
-    fn place_later(&mut self, moment: Moment, event: &Event) {
+    fn place_later(&mut self, moment: Moment, at: Time, event: &Event) {
         if self.referee.standing().is_some() {
             self.unplaced.clear();
             return;
@@ -324,13 +330,19 @@ impl History {
                 if self.unplaced.len() == NEWEST {
                     self.unplaced.pop_front();
                 }
-                self.unplaced.push_back(event.clone());
+                self.unplaced.push_back((at, event.clone()));
             }
         }
     }
 
     /// A report of its remote I/O, of a cycle; the wrong thing that it is, if it is one.
-    pub(crate) fn note(&mut self, cycle: i64, member: Member, event: &Event) -> Option<Violation> {
+    pub(crate) fn note(
+        &mut self,
+        cycle: i64,
+        member: Member,
+        at: Time,
+        event: &Event,
+    ) -> Option<Violation> {
         if let Event::Voided { samples, .. } = event {
             let sampled = self.steps.iter_mut().rev();
             let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);
@@ -338,11 +350,11 @@ impl History {
         }
         self.order.note(event);
         self.by = member;
-        let (sampled, violation) = self.sample(member, event);
+        let (sampled, violation) = self.sample(member, at, event);
         let violation = self.judged(event, violation);
         match event {
             Event::Sampled { moment, .. } => {
-                self.place_later(*moment, event);
+                self.place_later(*moment, at, event);
                 self.push(Step { cycle, moment: *moment, sampled, driven: None, void: false });
             }
             Event::Applied { moment, outputs, source, word_of, missing, heard, .. } => {

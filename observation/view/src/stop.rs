@@ -6,7 +6,7 @@ use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_typed::Fault;
-use understudy_wire::ProgramId;
+use understudy_wire::{ProgramId, Time};
 
 use crate::describe::program_fault_text;
 use crate::history::{History, Sampled};
@@ -104,7 +104,7 @@ impl Stops {
         if !fits(&self.cluster, program, event) {
             return None;
         }
-        let _ = history.note(0, member, event);
+        let _ = history.note(0, member, Time(record.at_ns), event);
         match event {
             RemoteIoEvent::Released { .. } => {
                 stop.released();

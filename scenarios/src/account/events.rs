@@ -6,6 +6,7 @@ use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::Action;
 use understudy_wire::{
     Force, Image, Member, Moment, OrderRefusal, Part, ProgramId, ProgramSet, Source, StationId,
+    Time,
 };
 
 use super::service::Outcome;
@@ -50,12 +51,18 @@ impl Account {
         }
     }
 
-    pub(super) fn remote_io(&mut self, member: Member, program: ProgramId, event: &RemoteIoEvent) {
+    pub(super) fn remote_io(
+        &mut self,
+        member: Member,
+        program: ProgramId,
+        at: Time,
+        event: &RemoteIoEvent,
+    ) {
         let violation = self
             .terms
             .referees
             .get_mut(program.index())
-            .and_then(|referee| referee.observe_from(member, event).err());
+            .and_then(|referee| referee.observe_from(member, at, event).err());
         // The records of the last samples of the other one may be missing, as after a restart.
         if let RemoteIoEvent::PartChanged { part: Part::Author, .. } = event
             && let Some(referee) = self.terms.referees.get_mut(program.index())

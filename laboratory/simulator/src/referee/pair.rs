@@ -2,11 +2,15 @@
 //!
 //! An author that has proved no output yet may sample next to the other one, without effect: its samples count from its first proved output on, or
 //! where a later sample of either extends them.
+//!
+//! The records of the two come on ways of their own: a process that is suspended after it has applied outputs may write the record long after its
+//! successor has written others. Such a record is judged by the reference run of its own cycle, and says nothing about who applies outputs now.
 
 use std::collections::VecDeque;
 
+use understudy_cycle::Versions;
 use understudy_remote_io::Event;
-use understudy_wire::{Lineage, Member, Source, Step};
+use understudy_wire::{Image, Lineage, Member, Moment, Source, Step, Time};
 
 use super::{Referee, Violation};
 
@@ -14,11 +18,20 @@ use super::{Referee, Violation};
 const PENDING: usize = 65_536;
 
 /// What is kept of two remote I/Os.
-#[derive(Debug, Clone, Default, Hash)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Pair {
     /// The one whose outputs were proved last, or that has sampled first.
     confirmed: Option<Member>,
     pending: VecDeque<Sampled>,
+    /// Cycle and time of its newest proved outputs.
+    proved: Option<(Moment, Time)>,
+}
+
+/// Only what records in order depend on: where all members are simulated, none is late.
+impl std::hash::Hash for Pair {
+    fn hash<H: std::hash::Hasher>(&self, hasher: &mut H) {
+        (self.confirmed, &self.pending).hash(hasher);
+    }
 }
 
 #[derive(Debug, Clone, Hash)]
@@ -42,12 +55,23 @@ impl std::hash::Hash for SampledEvent {
 }
 
 impl Referee {
-    /// As [`Self::observe`], of one of two remote I/Os of the program.
+    /// As [`Self::observe`], of one of two remote I/Os of the program, of which the events of each come in order; `at` is when it happened, on the
+    /// clock of its host.
     ///
     /// # Errors
     /// As [`Self::observe`].
-    pub fn observe_from(&mut self, member: Member, event: &Event) -> Result<(), Violation> {
+    pub fn observe_from(
+        &mut self,
+        member: Member,
+        at: Time,
+        event: &Event,
+    ) -> Result<(), Violation> {
         match event {
+            Event::Applied { moment, sampled, outputs, source, .. }
+                if self.is_late(member, *moment, at) =>
+            {
+                self.judge_late(*moment, sampled.as_ref(), (outputs, *source))
+            }
             Event::Sampled { inputs, before, change, .. } => {
                 if *self.pair.confirmed.get_or_insert(member) != member {
                     if self.pair.pending.len() == PENDING {
@@ -61,10 +85,11 @@ impl Referee {
                 }
                 self.observe_pending(*before).and(self.observe(event))
             }
-            Event::Applied { source: Source::Direct | Source::Reconstructed, .. }
-                if self.pair.confirmed != Some(member) =>
-            {
-                self.pair.confirmed = Some(member);
+            Event::Applied { moment, source: Source::Direct | Source::Reconstructed, .. } => {
+                self.pair.proved = Some((*moment, at));
+                if self.pair.confirmed.replace(member) == Some(member) {
+                    return self.observe(event);
+                }
                 let newest = self.pair.pending.iter().rposition(|it| it.member == member);
                 let newest = newest.and_then(|place| self.pair.pending.remove(place));
                 let observed = newest.map_or(Ok(()), |newest| {
@@ -80,6 +105,50 @@ impl Referee {
     /// Whether a sample of this remote I/O counts at once.
     pub fn counts(&self, member: Member) -> bool {
         self.pair.confirmed.is_none_or(|confirmed| confirmed == member)
+    }
+
+    /// Whether outputs were applied before those that the other one has proved, and are recorded after them.
+    fn is_late(&self, member: Member, moment: Moment, at: Time) -> bool {
+        let newer = self.pair.proved.is_some_and(|(of, then)| moment < of && at < then);
+        newer && self.pair.confirmed.is_some_and(|confirmed| confirmed != member)
+    }
+
+    /// Judges outputs that were applied before the newest ones; those that need more of the past than is remembered are not judged.
+    fn judge_late(
+        &mut self,
+        moment: Moment,
+        sampled: Option<&Image>,
+        (driven, source): (&Image, Source),
+    ) -> Result<(), Violation> {
+        let is_proved = matches!(source, Source::Direct | Source::Reconstructed);
+        let truth = sampled.filter(|_| is_proved).and_then(|inputs| self.truth_of(moment, inputs));
+        let Some(truth) = truth else {
+            self.gaps += 1;
+            return Ok(());
+        };
+        if truth == *driven {
+            return Ok(());
+        }
+        let (driven, truth) = (driven.clone(), Some(truth));
+        Err(Violation::Wrong { moment, source_: source, driven, truth })
+    }
+
+    /// h(x(t), u(t)) of an earlier sample without a change mark, where the states before and after it are remembered.
+    fn truth_of(&mut self, moment: Moment, inputs: &Image) -> Option<Image> {
+        let after = self.states.iter().rev().find(|state| state.stepped == moment)?;
+        let (program, lineage) = (after.program, after.lineage);
+        let before = self
+            .states
+            .iter()
+            .rev()
+            .find(|state| state.program == program && state.lineage.after(inputs) == lineage)?;
+        let mut bits = before.bits.clone();
+        let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
+        let executable = &versions.of(program)?.executable;
+        let mut outputs = Image::zero(executable.output_count());
+        let words = (bits.words_mut(), inputs.words(), outputs.words_mut());
+        executable.step(&mut self.scratch, words.0, words.1, words.2);
+        Some(outputs)
     }
 
     /// Takes the samples that lead to a lineage, where they did not count yet.

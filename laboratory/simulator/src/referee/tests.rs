@@ -5,7 +5,8 @@ use understudy_logic::CircuitBuilder;
 use understudy_remote_io::{PointPlace, Release, StaleState, ValueFault};
 use understudy_typed::Elementary;
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, ProgramId, Role, StationSet, Write, WriteId,
+    ClusterHash, ConfigurationHash, Cycle, Epoch, Member, ProgramId, Role, StationSet, Time, Write,
+    WriteId,
 };
 
 use super::*;
@@ -328,4 +329,51 @@ fn only_a_ramp_and_its_end_are_fail_safe() {
     descends(&[(false, 4)], false);
     descends(&[(false, 12)], false);
     descends(&[(true, 8)], false);
+}
+
+/// An author is suspended after its outputs of cycle 3, and writes the record at last when its twin has proved cycle 5.
+#[test]
+fn outputs_recorded_after_those_of_a_successor_are_judged_by_their_own_cycle() {
+    let (author, successor) = (Member::RemoteIo(ProgramId(0)), Member::Twin(ProgramId(0)));
+    let sampled = |cycle: u64, input| sampled(cycle, &[true; 8][1..cycle as usize], input);
+    let applied_of = |cycle, input, output, source| match applied(cycle, output, source) {
+        Event::Applied { moment, outputs, source, word_of, missing, heard, .. } => {
+            let (sampled, driven) = (input, None);
+            Event::Applied { moment, sampled, outputs, driven, source, word_of, missing, heard }
+        }
+        _ => unreachable!("outputs that were applied"),
+    };
+    let direct = |cycle, output| applied_of(cycle, Some(bit(true)), output, Source::Direct);
+    let mut referee = referee();
+    let mut take = |member, at, event: &Event| referee.observe_from(member, Time(at), event);
+    // y = x ⊕ u: only the first output is 1.
+    for (member, at, event) in [
+        (author, 10, sampled(1, true)),
+        (author, 18, direct(1, true)),
+        (author, 20, sampled(2, true)),
+        (author, 28, direct(2, false)),
+        (author, 30, sampled(3, true)),
+        (successor, 40, sampled(4, true)),
+        (successor, 48, direct(4, false)),
+        (successor, 50, sampled(5, true)),
+        (successor, 58, direct(5, false)),
+    ] {
+        assert_eq!(take(member, at, &event), Ok(()), "{event:?}");
+    }
+    let mut late = referee.clone();
+    assert_eq!(late.observe_from(author, Time(38), &direct(3, false)), Ok(()));
+    assert!(late.counts(successor) && !late.counts(author) && late.gaps() == 0);
+    let mut wrong = referee.clone();
+    let found = wrong.observe_from(author, Time(38), &direct(3, true));
+    assert!(matches!(found, Err(Violation::Wrong { truth: Some(_), .. })), "{found:?}");
+    // What was applied now is of an old cycle.
+    let mut old = referee.clone();
+    let found = old.observe_from(author, Time(59), &direct(3, false));
+    assert!(matches!(found, Err(Violation::Wrong { truth: None, .. })), "{found:?}");
+    for (input, source) in [(None, Source::Direct), (Some(bit(true)), Source::Held)] {
+        let mut unknown = referee.clone();
+        let event = applied_of(3, input, false, source);
+        assert_eq!(unknown.observe_from(author, Time(38), &event), Ok(()), "{event:?}");
+        assert_eq!(unknown.gaps(), 1, "{event:?}");
+    }
 }

@@ -52,7 +52,7 @@ impl Simulation {
         }
         let referee = &mut self.referees[program.index()];
         let (chosen, started) = (referee.operator_may_choose(), referee.cold_starts());
-        let mut found = referee.observe_from(member, event).err();
+        let mut found = referee.observe_from(member, self.now, event).err();
         if let (Some((moment, station)), false) = (holder, chosen)
             && referee.cold_starts() > started
         {

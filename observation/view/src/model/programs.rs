@@ -4,7 +4,7 @@ use understudy_journal::{Record, Tally, moment};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_wire::{
-    Image, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet,
+    Image, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet, Time,
 };
 
 use super::Model;
@@ -91,7 +91,8 @@ impl Model {
             _ => self.cycles.of(moment(&record.event)),
         };
         if !self.cycles.is_fixed()
-            && let Some(violation) = self.histories[place].note(cycle, member, event)
+            && let Some(violation) =
+                self.histories[place].note(cycle, member, Time(record.at_ns), event)
         {
             self.violated(record, cycle, &violation.to_string());
         }
