@@ -1,7 +1,8 @@
 //! Remote I/Os and networks of a campaign: each fails after an exponential time of being up, and its repair starts at the failure.
 //!
 //! A remote I/O without a twin fails the system with its failure, and so does a single network. Of a pair the other one continues: a switchover has
-//! succeeded where the twin is the author before the outputs have been held for `hold_cycles`. What was drawn for stations is not changed by these
+//! succeeded where the twin is the author before the outputs have been held for `hold_cycles`. An author that drives nothing more by itself, as
+//! where no station computes its program, has not failed: the stations have. What was drawn for stations is not changed by these
 //! parts, since they have a stream of chance of their own.
 
 use rand_distr::{Distribution, Exp1};
@@ -61,14 +62,22 @@ struct Place {
     /// The remote I/O and its twin, with whether they are up.
     members: Vec<(Member, bool)>,
     author: Option<Member>,
-    /// Since when no one is the author, where the twin was up then.
-    vacant: Option<Time>,
+    /// Since when no one is the author, where one was up then.
+    vacant: Option<Vacant>,
     /// For how long outputs may be held.
     patience_ns: u64,
 }
 
-/// A failure of the system: when, and by what.
-pub(super) type SystemFailed = (Time, String);
+/// The time without an author.
+#[derive(Debug, Clone, Copy)]
+struct Vacant {
+    since: Time,
+    /// Whether the author has failed; it drives nothing more by itself otherwise.
+    by_failure: bool,
+}
+
+/// A failure of the system: when, and by what; by its stations where that is nothing.
+pub(super) type SystemFailed = (Time, Option<String>);
 
 pub(super) struct Parts<'a> {
     cluster: &'a Cluster,
@@ -216,12 +225,13 @@ impl<'a> Parts<'a> {
             let is_pair = place.members.len() > 1;
             let cause =
                 if is_pair { format!("{name} after its twin") } else { format!("{name} alone") };
-            return Some((place.vacant.unwrap_or(now), cause));
+            let since = place.vacant.map_or(now, |vacant| vacant.since);
+            return Some((since, Some(cause)));
         };
         debug_assert_ne!(other, member);
         if place.author == Some(member) {
             place.author = None;
-            place.vacant = Some(now);
+            place.vacant = Some(Vacant { since: now, by_failure: true });
             self.found.switchovers += 1;
         }
         self.order(&[member], Action::Restart, self.plan.remote_io, |it| it.mttr_cycles);
@@ -235,24 +245,26 @@ impl<'a> Parts<'a> {
         if part == Part::Author {
             place.author = Some(member);
             let vacant = place.vacant.take();
-            let took = vacant.map_or(0, |since| now.0.saturating_sub(since.0));
+            let took = vacant.map_or(0, |vacant| now.0.saturating_sub(vacant.since.0));
             self.found.longest_ns = self.found.longest_ns.max(took);
             self.unsettled = Some(now);
         } else if place.author == Some(member) {
-            // It gave the outputs away by itself.
             place.author = None;
-            place.vacant = Some(now);
+            place.vacant = Some(Vacant { since: now, by_failure: false });
         }
     }
 
-    /// A twin that has not become the author in time.
+    /// Outputs that nobody has driven in time.
     fn overdue(&mut self, now: Time) -> Option<SystemFailed> {
-        let late = self.places.iter().position(|place| {
-            place.vacant.is_some_and(|since| now.0.saturating_sub(since.0) > place.patience_ns)
-        })?;
-        self.found.unmasked += 1;
+        let is_late = |place: &Place, vacant: Vacant| {
+            now.0.saturating_sub(vacant.since.0) > place.patience_ns
+        };
+        let late = (self.places.iter())
+            .position(|place| place.vacant.is_some_and(|vacant| is_late(place, vacant)))?;
+        let Vacant { since, by_failure } = self.places[late].vacant?;
+        self.found.unmasked += u64::from(by_failure);
         let name = &self.cluster.remote_ios()[late].name;
-        Some((self.places[late].vacant?, format!("no author of {name}")))
+        Some((since, by_failure.then(|| format!("no author of {name}"))))
     }
 
     fn network(&mut self, now: Time, via: Via, is_up: bool) -> Option<SystemFailed> {
@@ -268,7 +280,7 @@ impl<'a> Parts<'a> {
             if !self.networks.contains(&true) {
                 let is_pair = self.networks.len() > 1;
                 let cause = if is_pair { "both networks" } else { "the network" };
-                return Some((now, cause.to_owned()));
+                return Some((now, Some(cause.to_owned())));
             }
         }
         self.order_network(via, !is_up);

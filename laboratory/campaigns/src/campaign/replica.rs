@@ -41,7 +41,8 @@ pub(super) fn simulated(
         for (now, found) in seen.take() {
             if let Some((since, cause)) = series.see(now, &found) {
                 let run = lives.end(since, since.0 - origin.0, true);
-                return Ok((Run { cause: Some(cause), ..run }, series.into_found()));
+                let cause = cause.or(run.cause);
+                return Ok((Run { cause, ..run }, series.into_found()));
             }
             if let Seen::Lost(since) = found {
                 return Ok((lives.end(since, since.0 - origin.0, true), series.into_found()));
