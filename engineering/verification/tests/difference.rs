@@ -112,6 +112,30 @@ impl Sketch {
         changed
     }
 
+    /// The same with a preset that the timer has from its declaration, or from a variable; what the online change keeps is that of the old program.
+    fn with_kept_preset(mut self, dice: &mut Dice, in_variable: bool) -> Self {
+        let (of, preset) = match in_variable {
+            true => ("p", ["TIME := T#10ms", "TIME := T#30ms", "TIME := T#40ms"]),
+            false => {
+                let of_timer =
+                    ["TON := (PT := T#10ms)", "TON := (PT := T#30ms)", "TON := (PT := T#40ms)"];
+                ("t", of_timer)
+            }
+        };
+        self.types.insert(of, dice.one(&preset));
+        for statement in &mut self.statements {
+            for tens in 1..=4 {
+                let given = format!(", PT := T#{tens}0ms");
+                *statement = statement.replace(&given, if in_variable { ", PT := p" } else { "" });
+            }
+        }
+        if in_variable && dice.below(3) == 0 {
+            let preset = 1 + dice.below(5);
+            self.statements.insert(0, format!("IF a AND b THEN p := T#{preset}0ms; END_IF;"));
+        }
+        self
+    }
+
     fn program(&self) -> Program {
         let mut text = String::from(
             "PROGRAM p\n VAR_INPUT a, b : BOOL; END_VAR\n VAR_OUTPUT x, y : BOOL; n : DINT; END_VAR\n VAR ",
@@ -248,6 +272,16 @@ fn check(seed: u64, from_one_state: bool, counts: &mut Counts) {
     let mut dice = Dice(seed);
     let old = Sketch::new(&mut dice);
     let new = old.changed(&mut dice);
+    check_pair(seed, (old, new), dice, from_one_state, counts);
+}
+
+fn check_pair(
+    seed: u64,
+    (old, new): (Sketch, Sketch),
+    mut dice: Dice,
+    from_one_state: bool,
+    counts: &mut Counts,
+) {
     let pair = Pair::new(old.program(), new.program());
     let told =
         format!("seed {seed}\n{}\nto\n{}", old.statements.join("\n"), new.statements.join("\n"));
@@ -308,4 +342,19 @@ fn differences_from_one_state_are_those_of_runs() {
     (1_000..1_200).for_each(|seed| check(seed, true, &mut counts));
     assert!(counts.equal > 80 && counts.differs > 80, "{counts:?}");
     assert!(counts.in_the_way == 0, "{counts:?}");
+}
+
+/// A preset that no statement writes is not that of the new program: the old one's is kept.
+#[test]
+fn presets_that_are_kept_are_those_of_before() {
+    let mut counts = Counts::default();
+    for seed in 2_000..2_200 {
+        let mut dice = Dice(seed);
+        let old = Sketch::new(&mut dice);
+        let new = if seed % 4 < 2 { old.clone() } else { old.changed(&mut dice) };
+        let in_variable = seed % 8 < 4;
+        let [old, new] = [old, new].map(|it| it.with_kept_preset(&mut dice, in_variable));
+        check_pair(seed, (old, new), dice, seed % 2 == 0, &mut counts);
+    }
+    assert!(counts.equal > 80 && counts.differs > 50, "{counts:?}");
 }

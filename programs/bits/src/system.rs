@@ -84,12 +84,45 @@ pub struct System {
     pub(crate) most: BTreeMap<u32, i64>,
     /// Times since moments that are counted at least so far, by the prefix of their program and their address.
     pub(crate) least: BTreeMap<(String, u64), i64>,
+    /// What variables begin with beside their initial values, of the program that is being added.
+    pub(crate) begins: Begins,
     /// Names of numbers that properties compare.
     pub(crate) wanted: BTreeSet<String>,
     /// Numbers that properties compare: after the scan, an input in the scan.
     pub numbers: Vec<(String, Term)>,
     /// Names of the values of enumerations.
     pub values: HashMap<String, Vec<(String, i64)>>,
+}
+
+/// What variables of a program begin with, by address, where it takes the place of another one: what nothing writes keeps that too.
+#[derive(Debug, Clone, Default)]
+pub(crate) enum Begins {
+    /// Their initial values.
+    #[default]
+    Initially,
+    /// The values of a state.
+    In(Vec<u64>),
+    /// At most these numbers; any where that is nothing. All others begin with their initial values.
+    AtMost(BTreeMap<u64, Option<i64>>),
+}
+
+impl Begins {
+    /// The greatest number that a variable begins with; nothing where it may be any.
+    pub(crate) fn greatest(&self, address: u64, of: Elementary, initial: u64) -> Option<i64> {
+        let number = |stored: u64| i64::try_from(of.signed(stored & of.mask())).ok();
+        let initial = number(initial)?;
+        match self {
+            Self::Initially => Some(initial),
+            Self::In(state) => {
+                let slot = state.get((address / 64) as usize).copied().unwrap_or(0);
+                Some(initial.max(number(slot >> (address % 64))?))
+            }
+            Self::AtMost(numbers) => match numbers.get(&address) {
+                Some(most) => Some(initial.max((*most)?)),
+                None => Some(initial),
+            },
+        }
+    }
 }
 
 /// The names and values of an enumeration.
@@ -144,6 +177,7 @@ impl System {
             restarting: Vec::new(),
             most: BTreeMap::new(),
             least: BTreeMap::new(),
+            begins: Begins::default(),
             wanted: BTreeSet::new(),
             numbers: Vec::new(),
             values: HashMap::new(),

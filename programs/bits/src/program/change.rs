@@ -18,7 +18,8 @@ use understudy_typed::{Comparison, Elementary, Operation, Origin, Program};
 use super::{Outputs, together};
 use crate::System;
 use crate::execute::Unsupported;
-use crate::system::{Holds, Source};
+use crate::extent::Extents;
+use crate::system::{Begins, Cell, Holds, Source};
 use crate::term::{Term, Variable};
 
 /// Prefix of the signals of the old program.
@@ -120,7 +121,7 @@ impl System {
             let known = asked.clone();
             let Asked { wanted, least } = known.clone();
             let mut system = Self { wanted, least, ..Self::new(&after.name) };
-            let mut both = system.both(before, after, origins.clone())?;
+            let mut both = system.both(before, after, switch, origins.clone())?;
             let changed = match switch {
                 Switch::Now { before, after } => {
                     system.begin(&both.old, before, &mut asked);
@@ -152,6 +153,7 @@ impl System {
         &mut self,
         before: &'p Program,
         after: &'p Program,
+        switch: Switch<'_>,
         origins: BTreeMap<u64, Origin>,
     ) -> Result<Both<'p>, Unsupported> {
         let points = before.inputs.iter().filter(|point| point.slot != 0);
@@ -164,9 +166,17 @@ impl System {
             None => self.input(point.name.clone(), point.of, None),
         });
         let of_new: Vec<Term> = of_new.collect();
+        if let Switch::Now { before, .. } = switch {
+            self.begins = Begins::In(before.to_vec());
+        }
         let old = self.side(OLD, before, &given)?;
         let named = [self.observed.len(), self.shown.len()];
+        self.begins = match switch {
+            Switch::Now { after, .. } => Begins::In(after.to_vec()),
+            Switch::AnyScan { .. } => Begins::AtMost(self.greatest_taken_over(&old, &origins)),
+        };
         let new = self.side(NEW, after, &of_new)?;
+        self.begins = Begins::Initially;
         Ok(Both { old, new, named, origins })
     }
 
@@ -180,6 +190,23 @@ impl System {
         let runs = self.terms.boolean(true);
         let outputs = self.add_program(prefix, program, inputs, runs)?;
         Ok(Side { prefix, program, cells: first..self.cells.len() as u32, outputs })
+    }
+
+    /// The greatest number that each variable of the new program takes over; nothing where the old one may have any, or keeps it in another way.
+    fn greatest_taken_over(
+        &self,
+        old: &Side<'_>,
+        origins: &BTreeMap<u64, Origin>,
+    ) -> BTreeMap<u64, Option<i64>> {
+        let extents = Extents::new(self, &[]);
+        let cells = &self.cells[old.cells.start as usize..old.cells.end as usize];
+        let greatest = |from: u64| {
+            let is_it = |cell: &&Cell| matches!(cell.holds, Holds::Value(at, _) if at == from);
+            let cell = cells.iter().find(is_it)?;
+            let high = extents.get(cell.term).high;
+            (high < cell.of.limits().1).then(|| i64::try_from(high).ok()).flatten()
+        };
+        origins.iter().map(|(&now, origin)| (now, greatest(origin.before))).collect()
     }
 
     /// Begins one of the programs in a state.

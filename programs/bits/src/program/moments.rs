@@ -391,7 +391,7 @@ impl System {
                 Some(then.max(self.bound(otherwise, scanned, open)?))
             }
             Node::Variable(Variable::Cell(cell)) => {
-                let initial = self.cells[cell as usize].initial as i64;
+                let initial = self.greatest_at_first(cell)?;
                 match scanned.written.get(&cell) {
                     Some(_) if open.cells.contains(&cell) => Some(initial),
                     Some(&written) => {
@@ -404,6 +404,15 @@ impl System {
                 }
             }
             _ => None,
+        }
+    }
+
+    /// The greatest number that a cell begins with.
+    fn greatest_at_first(&self, cell: u32) -> Option<i64> {
+        let cell = &self.cells[cell as usize];
+        match cell.holds {
+            Holds::Value(address, of) => self.begins.greatest(address, of, cell.initial),
+            _ => Some(cell.initial as i64),
         }
     }
 
