@@ -9,6 +9,7 @@
 //! large as the longest run without repetition all the same, so there is a bound on it.
 
 mod clauses;
+mod equal;
 
 use std::cell::Cell;
 
@@ -18,6 +19,7 @@ use crate::effort::{ALWAYS, GoOn};
 use crate::property::{Formula, Path};
 use crate::symbolic::{Cone, Resolved, Trace, rows};
 use clauses::{Patience, Unrolling};
+pub(crate) use equal::reduced;
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! Proofs of the properties of a ladder program, requested and standard.
 
 mod conclusion;
+mod part;
 mod questions;
 mod remarks;
 mod sampled;
@@ -20,12 +21,13 @@ use understudy_text::spelling::suggestion;
 use crate::assumed::{assuming, with_assumptions};
 use crate::effort::{ALWAYS, GoOn};
 use crate::explicit::Explicit;
+use crate::induction::reduced;
 use crate::property::{Asked, Formula, Named, Path, Property};
 use crate::symbolic::{Resolved, Signal, Trace, resolve};
 
 pub use conclusion::Conclusion;
 pub use remarks::{Remark, Remarks};
-pub(crate) use sampled::words;
+pub(crate) use sampled::{mixed, words};
 use stages::Stages;
 pub use stages::Undecided;
 pub use unasked::{Lamp, OutputFinding};
@@ -105,6 +107,8 @@ pub struct Subject {
     restarting: Vec<usize>,
     /// Those that an assumption keeps FALSE.
     never_restarting: Vec<usize>,
+    /// What is proved with, computed on first use.
+    reduced: OnceCell<Circuit>,
     /// All reachable states, computed on first use.
     listed: OnceCell<Explicit>,
 }
@@ -142,6 +146,7 @@ impl Subject {
             assumed: None,
             restarting: Vec::new(),
             never_restarting: Vec::new(),
+            reduced: OnceCell::new(),
             listed: OnceCell::new(),
         }
     }
@@ -186,6 +191,11 @@ impl Subject {
     /// What is proved about: the program's outputs come first, then its memory and pins.
     pub fn circuit(&self) -> &Circuit {
         &self.circuit
+    }
+
+    /// The same circuit, in which registers that are always equal are one.
+    fn reduced(&self) -> &Circuit {
+        self.reduced.get_or_init(|| reduced(&self.circuit))
     }
 
     /// The program's own outputs.

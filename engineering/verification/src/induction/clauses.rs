@@ -1,7 +1,7 @@
 //! Scans one after the other as clauses, after Tseitin: a variable an operation and scan.
 
 use std::cell::Cell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use batsat::{Callbacks, Lit, Solver, SolverInterface, SolverOpts, lbool};
 use understudy_logic::{Circuit, Expression, Operation, Variable};
@@ -68,11 +68,63 @@ impl<'c> Unrolling<'c> {
         Self { circuit, solver, one, registers, before, inputs: Vec::new(), made: Vec::new() }
     }
 
-    /// Adds a scan.
-    pub(super) fn scan(&mut self) {
+    /// A first scan of a state in which these registers are equal, added to their first values, and after which some are not: those that are 1 after it.
+    /// An absent one is the constant 0. Nothing where there is none, and where that takes too long.
+    pub(super) fn difference(
+        &mut self,
+        equal: &[(usize, Option<usize>)],
+    ) -> Option<Option<HashSet<usize>>> {
+        if self.made.is_empty() {
+            self.begin_scan();
+        }
+        let mut assumed = Vec::new();
+        let mut after = HashMap::new();
+        let mut differ = Vec::new();
+        for &(register, other) in equal {
+            let (one, two) = (self.value(register), other.map(|other| self.value(other)));
+            let both = [0, 1].map(|time: usize| match two {
+                None => one[time],
+                Some(two) => self.sum(one[time], two[time]),
+            });
+            assumed.push(!both[0]);
+            differ.push(both[1]);
+            after.insert(register, one[1]);
+            after.extend(other.zip(two).map(|(other, two)| (other, two[1])));
+        }
+        let some = Lit::new(self.solver.new_var_default(), true);
+        differ.push(!some);
+        self.solver.add_clause_reuse(&mut differ);
+        assumed.push(some);
+        match self.solver.solve_limited(&assumed) {
+            found if found == lbool::TRUE => {
+                let ones = after.into_iter();
+                let ones = ones.filter(|(_, one)| self.solver.value_lit(*one) == lbool::TRUE);
+                Some(Some(ones.map(|(register, _)| register).collect()))
+            }
+            found if found == lbool::FALSE => Some(None),
+            _ => None,
+        }
+    }
+
+    /// A register before the first scan and after it, added to its first value.
+    fn value(&mut self, register: usize) -> [Lit; 2] {
+        let place = self.registers.binary_search(&(register as u32));
+        let before = self.before[0][place.expect("a register of the cone")];
+        let circuit = self.circuit;
+        let of = &circuit.registers()[register];
+        let both = [before, self.expression(of.next, 0)];
+        both.map(|value| if of.initial { !value } else { value })
+    }
+
+    fn begin_scan(&mut self) {
         self.solver.cb_mut().scans += 1;
         self.inputs.push(HashMap::new());
         self.made.push(HashMap::new());
+    }
+
+    /// Adds a scan.
+    pub(super) fn scan(&mut self) {
+        self.begin_scan();
         let scan = self.made.len() - 1;
         let registers = self.registers.clone();
         let next = registers.into_iter().map(|register| {

@@ -36,14 +36,14 @@ impl Sampled {
         let mut inputs = vec![[0]; scan.input_count()];
         let mut seen = vec![None; questions.len()];
         let mut rows = Vec::with_capacity(SCANS);
-        let mut mixed = 1_u64;
+        let mut random = 1_u64;
         let mut open = questions.len();
         for number in 0..SCANS {
             if open == 0 {
                 break;
             }
             for [input] in &mut inputs {
-                *input ^= flips(&mut mixed);
+                *input ^= flips(&mut random);
             }
             scan.step_wide(&mut scratch, &mut state, &inputs, &mut outputs);
             rows.push(inputs.clone());
@@ -73,19 +73,21 @@ impl Sampled {
 }
 
 /// Which runs an input changes in: half of them every second scan, others every eighth, others every thirty-second, as timers need it.
-fn flips(mixed: &mut u64) -> u64 {
-    let mut draw = || {
-        // SplitMix64.
-        *mixed = mixed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut word = *mixed;
-        word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        word ^ (word >> 31)
-    };
+fn flips(random: &mut u64) -> u64 {
+    let mut draw = || mixed(random);
     let often = draw();
     let seldom = often & draw() & draw();
     let rarely = seldom & draw() & draw();
     often & 0xffff_ffff | seldom & 0xffff << 32 | rarely & 0xffff << 48
+}
+
+/// The next word of SplitMix64.
+pub(crate) fn mixed(random: &mut u64) -> u64 {
+    *random = random.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut word = *random;
+    word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    word ^ (word >> 31)
 }
 
 /// In which runs the formula holds; what speaks of more than one scan holds in none.

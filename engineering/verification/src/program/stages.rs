@@ -1,6 +1,7 @@
 //! Properties of a program by several methods, the cheap ones first:
 //!
 //! ```text
+//! very few states of each part   timers that begin each other: few of many states, and large diagrams
 //! diagrams of few nodes          most properties of most ladders, with runs that show why
 //! runs of a few scans            invariants of large programs that break soon
 //! induction over few scans       invariants, however large the program is
@@ -12,9 +13,11 @@
 //! A method sees what those before it left undecided.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use understudy_logic::bdd::BddError;
 
+use super::part::Part;
 use super::{Answer, Bounds, Subject};
 use crate::effort::{Stopped, Work};
 use crate::explicit::{Explicit, ExplicitError};
@@ -26,6 +29,10 @@ use understudy_logic::Variable;
 const NODES: [usize; 2] = [1 << 17, 1 << 20];
 /// Parts of a program that may be too large before diagrams of that many nodes are given up.
 const REFUSED: u32 = 3;
+/// Parts whose states are listed first: their registers, their inputs, and the share of the states that count as few. Of fewer registers diagrams are small.
+const REGISTERS: RangeInclusive<usize> = 16..=64;
+const INPUTS: usize = 4;
+const SHARE: usize = 64;
 /// The search of short runs: registers from which on a property needs it, the scans of its runs, operations of all scans together, and steps for all properties.
 const LARGE: usize = 30;
 const SOON: u32 = 40;
@@ -104,10 +111,11 @@ impl<'s, 'b> Stages<'s, 'b> {
     pub(super) fn run(mut self) -> Vec<Answer> {
         let [few, more] = NODES;
         let all = self.bounds.nodes;
+        self.list_parts();
         self.diagrams(few.min(all));
         self.search();
         self.induction(FEW_SCANS.min(self.bounds.scans), FEW_STEPS);
-        let few_states = Explicit::few(&self.subject.circuit).min(self.bounds.states);
+        let few_states = Explicit::few(self.subject.reduced()).min(self.bounds.states);
         let listed = self.list(few_states);
         if all > few {
             self.diagrams(more.min(all));
@@ -134,12 +142,12 @@ impl<'s, 'b> Stages<'s, 'b> {
         self.answers[place] = Some(answer);
     }
 
-    /// With fewer nodes than allowed the order of variables changes early, and not at the bound.
+    /// With few nodes the order of variables changes early, and not at the bound.
     fn diagrams(&mut self, nodes: usize) {
-        let circuit = &self.subject.circuit;
+        let circuit = self.subject.reduced();
         let go_on = self.bounds.go_on;
         let mut checker = Checker::new(circuit, self.fair.clone(), nodes).while_wanted(go_on);
-        if nodes < self.bounds.nodes {
+        if nodes <= NODES[0] {
             checker = checker.reordered_early();
         }
         let mut failures = 0;
@@ -163,12 +171,49 @@ impl<'s, 'b> Stages<'s, 'b> {
         }
     }
 
+    /// Each property by a list of the states of what it depends on.
+    fn list_parts(&mut self) {
+        let whole = self.subject.reduced();
+        let mut larger = 0;
+        for place in self.left() {
+            let property = &self.properties[place];
+            let cone = Cone::of(whole, [property]);
+            let is_input = |variable: &&Variable| matches!(variable, Variable::Input(_));
+            let inputs = cone.variables.iter().filter(is_input).count();
+            let registers = cone.variables.len() - inputs;
+            let is_listed = REGISTERS.contains(&registers) && inputs <= INPUTS;
+            if !self.fair.is_empty() || !is_listed || larger >= REFUSED {
+                continue;
+            }
+            let part = Part::of(whole, &cone, property);
+            let bound = (Explicit::few(&part.circuit) / SHARE).min(self.bounds.states);
+            let go_on = self.bounds.go_on;
+            let (listed, error) = Explicit::explore(&part.circuit, bound, go_on, &mut |_| {});
+            match error {
+                None => {}
+                Some(ExplicitError::Time { .. }) => {
+                    self.over = true;
+                    return;
+                }
+                Some(_) => {
+                    larger += 1;
+                    continue;
+                }
+            }
+            for (holds, run) in listed.check(std::slice::from_ref(&part.property)) {
+                let trace = run.map(|run| rows(whole, &cone, part.run_of_whole(run)));
+                let answer = if holds { Answer::Holds(trace) } else { Answer::Fails(trace) };
+                self.answer(place, answer);
+            }
+        }
+    }
+
     /// Invariants that break within a few scans: large diagrams and lists take long to find what a run of few scans shows.
     fn search(&mut self) {
         if !self.fair.is_empty() {
             return;
         }
-        let circuit = &self.subject.circuit;
+        let circuit = self.subject.reduced();
         let left = self.left();
         let steps = SOON_STEPS / left.len().max(1) as u64;
         for place in left {
@@ -212,7 +257,7 @@ impl<'s, 'b> Stages<'s, 'b> {
             let Some(kept) = invariant(&self.properties[place]) else {
                 continue;
             };
-            match prove_always(&self.subject.circuit, kept, depth) {
+            match prove_always(self.subject.reduced(), kept, depth) {
                 Some(Induction::Holds(_)) => self.answer(place, Answer::Holds(None)),
                 Some(Induction::Fails(trace)) if self.fair.is_empty() => {
                     self.answer(place, Answer::Fails(Some(trace)));
@@ -237,7 +282,7 @@ impl<'s, 'b> Stages<'s, 'b> {
         if left.is_empty() || !self.fair.is_empty() {
             return None;
         }
-        let circuit = &self.subject.circuit;
+        let circuit = self.subject.reduced();
         if self.subject.listed.get().is_none() {
             let (listed, error) = Explicit::explore(circuit, bound, self.bounds.go_on, &mut |_| {});
             if let Some(error) = error {
@@ -270,7 +315,7 @@ impl<'s, 'b> Stages<'s, 'b> {
             .filter_map(|place| Some((place, invariant(&self.properties[place])?.clone())))
             .collect();
         let kept: Vec<Resolved> = invariants.iter().map(|(_, kept)| kept.clone()).collect();
-        let circuit = &self.subject.circuit;
+        let circuit = self.subject.reduced();
         for ((place, kept), broken) in invariants.into_iter().zip(listed.broken(&kept)) {
             match broken {
                 Some(run) => {

@@ -27,8 +27,6 @@ impl Cone {
         for formula in formulas {
             cone.signals.extend(formula.signals());
         }
-        let graph = circuit.graph();
-        let mut seen = BTreeSet::new();
         let mut pending: Vec<Expression> = Vec::new();
         for signal in &cone.signals {
             match signal {
@@ -38,20 +36,35 @@ impl Cone {
                 }
             }
         }
+        cone.follow(circuit, pending);
+        cone
+    }
+
+    /// Of some registers.
+    pub(crate) fn of_registers(circuit: &Circuit, registers: &[usize]) -> Self {
+        let mut cone = Self::default();
+        let own = registers.iter().map(|&register| Variable::Register(register as u32));
+        cone.variables.extend(own);
+        let next = registers.iter().map(|&register| circuit.registers()[register].next);
+        cone.follow(circuit, next.collect());
+        cone
+    }
+
+    fn follow(&mut self, circuit: &Circuit, mut pending: Vec<Expression>) {
+        let mut seen = BTreeSet::new();
         while let Some(expression) = pending.pop() {
             if !seen.insert(expression) {
                 continue;
             }
-            let operation = graph.operation(expression);
+            let operation = circuit.graph().operation(expression);
             if let Operation::Variable(variable) = operation
-                && cone.variables.insert(variable)
+                && self.variables.insert(variable)
                 && let Variable::Register(register) = variable
             {
                 pending.push(circuit.registers()[register as usize].next);
             }
             pending.extend(operation.operands());
         }
-        cone
     }
 
     /// The signals that it is about, then the other inputs that they depend on.

@@ -1,0 +1,80 @@
+//! The part of a circuit that a property depends on, as a circuit of its own: it has fewer states to list than the whole.
+
+use understudy_logic::{Circuit, CircuitBuilder, Expression, Variable};
+
+use crate::symbolic::{Cone, Resolved, Signal};
+
+/// A property with what it depends on.
+pub(super) struct Part {
+    pub(super) circuit: Circuit,
+    pub(super) property: Resolved,
+    /// The inputs of the part, by their places in the whole, which has so many.
+    inputs: Vec<usize>,
+    count: usize,
+}
+
+impl Part {
+    /// Of `cone`, which is that of `property`.
+    pub(super) fn of(whole: &Circuit, cone: &Cone, property: &Resolved) -> Self {
+        let mut builder = CircuitBuilder::new(whole.name());
+        let (mut inputs, mut registers) = (Vec::new(), Vec::new());
+        let (mut of_input, mut of_register) = (Vec::new(), Vec::new());
+        for variable in &cone.variables {
+            match *variable {
+                Variable::Input(input) => {
+                    of_input.push(builder.input(&whole.inputs()[input as usize]));
+                    inputs.push(input as usize);
+                }
+                Variable::Register(register) => {
+                    let of = &whole.registers()[register as usize];
+                    of_register.push(builder.register(&of.name, of.initial));
+                    registers.push(register as usize);
+                }
+            }
+        }
+        let outputs: Vec<usize> = (cone.signals.iter())
+            .filter_map(|signal| match signal {
+                Signal::Output(output) => Some(*output),
+                Signal::Input(_) => None,
+            })
+            .collect();
+        let next = registers.iter().map(|&register| whole.registers()[register].next);
+        let values = outputs.iter().map(|&output| whole.outputs()[output].value);
+        let roots: Vec<Expression> = next.chain(values).collect();
+        // Variables and signals of a cone are in ascending order.
+        let place = |places: &[usize], of: usize| {
+            places.binary_search(&of).expect("a cone holds what its functions read")
+        };
+        let copies = builder.graph().import(whole.graph(), &roots, |_, variable| match variable {
+            Variable::Input(input) => of_input[place(&inputs, input as usize)],
+            Variable::Register(register) => of_register[place(&registers, register as usize)].1,
+        });
+        let (next, values) = copies.split_at(registers.len());
+        for (&(register, _), &next) in of_register.iter().zip(next) {
+            builder.set_next(register, next);
+        }
+        for (&output, &value) in outputs.iter().zip(values) {
+            builder.output(&whole.outputs()[output].name, value);
+        }
+        let property = property.map(&|signal: &Signal| match *signal {
+            Signal::Output(output) => outputs.binary_search(&output).ok().map(Signal::Output),
+            Signal::Input(input) => inputs.binary_search(&input).ok().map(Signal::Input),
+        });
+        Self {
+            property: property.expect("a cone holds the signals of its property"),
+            circuit: builder.finish().expect("the names are those of a circuit"),
+            count: whole.inputs().len(),
+            inputs,
+        }
+    }
+
+    /// The inputs of a run of the part as those of the whole; the others are 0.
+    pub(super) fn run_of_whole(&self, run: Vec<Vec<bool>>) -> Vec<Vec<bool>> {
+        let scans = run.into_iter().map(|scan| {
+            let mut all = vec![false; self.count];
+            self.inputs.iter().zip(scan).for_each(|(&input, value)| all[input] = value);
+            all
+        });
+        scans.collect()
+    }
+}
