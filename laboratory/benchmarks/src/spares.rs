@@ -5,7 +5,8 @@ mod group;
 mod witness;
 
 use std::fmt::Write as _;
-use std::io::{BufRead, BufReader};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -78,7 +79,7 @@ struct Round {
     before: u64,
     /// Held and fail-safe deadlines after it, until 1 s after the second kill.
     after: u64,
-    /// Stalls that remote I/Os reported in the round.
+    /// Stalls that members of the group and the spare reported in the round.
     stalls: u64,
 }
 
@@ -149,7 +150,7 @@ fn round(
     let first = stations[victim].clone();
     // The understudy is the last one; where it is the first victim, a controller is the second.
     let second = stations[if victim == 2 { 0 } else { 2 }].clone();
-    let begun = group.counts();
+    let (begun, stalls) = (group.counts(), group.stalls() + spare.stalls());
     let retired = spare.count("retires");
     let killed = Instant::now();
     let killed_ns = witness::monotonic_ns();
@@ -177,8 +178,7 @@ fn round(
     group.kill(&second)?;
     std::thread::sleep(OBSERVED);
     let after = missed(group, &middle);
-    let stalls = group.counts().iter().map(|of| of.stalls).sum::<u64>()
-        - begun.iter().map(|of| of.stalls).sum::<u64>();
+    let stalls = group.stalls() + spare.stalls() - stalls;
     group.start_station(&first)?;
     group.start_station(&second)?;
     spare.until("retires", retired + 1)?;
@@ -249,6 +249,9 @@ fn sibling() -> Result<PathBuf, Answer> {
 struct Spare {
     process: Child,
     said: Arc<Mutex<Vec<String>>>,
+    /// The journal of its station in each group, with its length when it was read last.
+    journals: Vec<(PathBuf, u64)>,
+    stalls: u64,
 }
 
 impl Spare {
@@ -280,7 +283,8 @@ impl Spare {
         }
         let mut command = Command::new(program);
         command.arg("spare").arg(&file).args(["--name", "spare-1", "--keys"]).arg(&keys);
-        command.arg("--ends-with-parent");
+        let journals = arguments.folder.join("journals");
+        command.arg("--ends-with-parent").arg("--journals").arg(&journals);
         if arguments.no_real_time {
             command.arg("--no-real-time");
         }
@@ -295,7 +299,25 @@ impl Spare {
                 }
             });
         }
-        Ok(Self { process, said })
+        let of = |group: &Group| (journals.join(format!("{}.jsonl", group.name)), 0);
+        let journals = groups.iter().map(of).collect();
+        Ok(Self { process, said, journals, stalls: 0 })
+    }
+
+    /// Stalls that its stations have reported so far.
+    fn stalls(&mut self) -> u64 {
+        for (path, length) in &mut self.journals {
+            let mut told = String::new();
+            // There is none before its station has been awake.
+            if let Ok(mut journal) = File::open(path)
+                && journal.seek(SeekFrom::Start(*length)).is_ok()
+                && journal.read_to_string(&mut told).is_ok()
+            {
+                *length += told.len() as u64;
+                self.stalls += told.matches("\"event\":\"stalled\"").count() as u64;
+            }
+        }
+        self.stalls
     }
 
     /// Lines so far that contain a text.

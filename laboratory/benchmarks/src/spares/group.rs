@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -114,6 +115,8 @@ pub(super) struct Group {
     processes: BTreeMap<String, Child>,
     /// By program: what its remote I/O has reported.
     counts: Vec<Arc<Mutex<Counts>>>,
+    /// Of its stations.
+    stalls: Arc<AtomicU64>,
 }
 
 impl Group {
@@ -164,6 +167,7 @@ impl Group {
             real_time,
             processes: BTreeMap::new(),
             counts: cluster.controllers().iter().map(|_| Arc::default()).collect(),
+            stalls: Arc::default(),
             cluster,
         };
         group.issue_keys()?;
@@ -204,16 +208,18 @@ impl Group {
             command.arg("--no-real-time");
         }
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
-        if let Member::RemoteIo(_) = member {
+        if !matches!(member, Member::Plant(_)) {
             command.stdout(Stdio::piped());
         }
         let mut process = command.spawn().map_err(|error| failed(&name, &error))?;
-        if let (Member::RemoteIo(program), Some(journal)) = (member, process.stdout.take()) {
-            witness::follow(
+        match (member, process.stdout.take()) {
+            (Member::RemoteIo(program), Some(journal)) => witness::follow(
                 journal,
                 self.referee(program)?,
                 Arc::clone(&self.counts[program.index()]),
-            );
+            ),
+            (_, Some(journal)) => witness::follow_stalls(journal, Arc::clone(&self.stalls)),
+            (_, None) => {}
         }
         self.processes.insert(name, process);
         Ok(())
@@ -254,6 +260,12 @@ impl Group {
     /// By program: what its remote I/O has reported so far.
     pub(super) fn counts(&self) -> Vec<Counts> {
         self.counts.iter().map(witness::now).collect()
+    }
+
+    /// Stalls that its members have reported so far.
+    pub(super) fn stalls(&self) -> u64 {
+        let stations = self.stalls.load(Ordering::Relaxed);
+        self.counts().iter().fold(stations, |all, of| all + of.stalls)
     }
 
     /// Waits until all remote I/Os have reported something.

@@ -1,10 +1,12 @@
 //! What the remote I/Os of a group report, judged by a referee while they run.
 
 use std::io::{BufRead, BufReader, Read};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nix::time::{ClockId, clock_gettime};
 use understudy_journal::{Happening, Record};
+use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event;
 use understudy_simulator::Referee;
 use understudy_wire::Source;
@@ -55,6 +57,20 @@ impl Counts {
             _ => {}
         }
     }
+}
+
+/// Counts the stalls that a journal tells of until it ends.
+pub(super) fn follow_stalls(journal: impl Read + Send + 'static, stalls: Arc<AtomicU64>) {
+    std::thread::spawn(move || {
+        let lines = BufReader::new(journal).lines().map_while(Result::ok);
+        // Reading all that a station reports would take more of a core than the station.
+        for line in lines.filter(|line| line.contains("stalled")) {
+            let event = serde_json::from_str::<Record>(&line).map(|record| record.event);
+            if let Ok(Happening::Station(StationEvent::Stalled { .. })) = event {
+                stalls.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    });
 }
 
 /// The monotonic clock of the host, as records have it.
