@@ -138,6 +138,11 @@ impl TimesOfDay {
         u64::try_from(unix_ns).ok().map(TimeOfDay)
     }
 
+    /// The time of day of a record of whoever runs all members on one host.
+    pub fn of_host(&self, at_ns: u64) -> Option<TimeOfDay> {
+        self.of_record(self.reference.as_deref()?, at_ns)
+    }
+
     /// A remote I/O has passed the deadline of a cycle.
     pub fn passed(&mut self, name: &str, cycle: i64, at_ns: u64) {
         let Some(TimeOfDay(unix_ns)) = self.of_record(name, at_ns) else {

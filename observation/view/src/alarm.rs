@@ -72,6 +72,9 @@ pub struct Alarm {
     texts: Texts,
 }
 
+/// Time from the record that raises an alarm to its cycle, past which the record tells when it began.
+const PAUSE_NS: u64 = 1_000_000_000;
+
 impl Alarm {
     /// Record of the journal for an acknowledgement by `owner`.
     pub fn acknowledgement(&self, owner: String, at_unix_s: u64) -> Acknowledgement {
@@ -108,8 +111,11 @@ impl Alarm {
     /// With its times of day.
     pub(crate) fn timed(self, times: &TimesOfDay) -> Self {
         let of = |cycle: Option<i64>| times.of_cycle(cycle?);
+        // Where all members stood still, the cycle of the alarm came long after the record that raised it.
+        let recorded = self.raised_at.zip(of(Some(self.cycle)));
+        let recorded = recorded.filter(|(then, of)| of.0.saturating_sub(then.0) > PAUSE_NS);
         Self {
-            raised_at: of(Some(self.cycle)),
+            raised_at: recorded.map(|(then, _)| then).or_else(|| of(Some(self.cycle))),
             over_at: of(self.over),
             acknowledged_at: of(self.acknowledged_in),
             ..self
@@ -180,6 +186,8 @@ pub(crate) struct Alarms {
     count: u64,
     /// The time of the record that is taken.
     pub(crate) now_ns: u64,
+    /// Its time of day, where its clock is known.
+    pub(crate) now: Option<TimeOfDay>,
     /// Alarms of cycles up to this one may have been raised before: the journal was not read from its first record.
     pub(crate) found_until: Option<i64>,
 }
@@ -299,7 +307,7 @@ impl Alarms {
             repeated_in: None,
             priority: None,
             action: None,
-            raised_at: None,
+            raised_at: self.now,
             over_at: None,
             acknowledged_at: None,
             concerns: Concerns::default(),

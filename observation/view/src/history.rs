@@ -343,6 +343,10 @@ impl History {
         at: Time,
         event: &Event,
     ) -> Option<Violation> {
+        if let Event::StateLost { asks: true, .. } = event {
+            // Nothing but an order of a person leads from here to an older state.
+            self.referee.operator_chooses();
+        }
         if let Event::Voided { samples, .. } = event {
             let sampled = self.steps.iter_mut().rev();
             let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);

@@ -188,6 +188,7 @@ impl Model {
         self.times.note(record);
         self.now = self.times.of_record(&record.name, record.at_ns);
         self.alarms.now_ns = record.at_ns;
+        self.alarms.now = self.now.or_else(|| self.times.of_host(record.at_ns));
         self.counters.note(record);
         self.take(record);
         if let Some(shift) = self.cycles.take_shift() {

@@ -105,6 +105,7 @@ impl Model {
         self.times.note(record);
         self.now = None;
         self.alarms.now_ns = record.at_ns;
+        self.alarms.now = None;
         self.take(record);
         self.cycles.fix(None);
         self.events.clear();

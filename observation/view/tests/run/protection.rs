@@ -50,6 +50,18 @@ fn a_loss_of_protection_and_of_a_state_are_alarms_with_their_causes() {
     insta::assert_snapshot!("protection", changes(cell, &records).join("\n"));
 }
 
+/// A program goes back to an older state, because a person has chosen it: that is no fault of anybody.
+#[test]
+fn a_state_that_a_person_has_chosen_is_not_wrong() {
+    let cell = cell();
+    let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
+    let records = records(&cell, &scenario(&cell, LOST_STATE), 1);
+    records.iter().for_each(|record| model.note(record));
+    let wrong: Vec<_> = model.events().filter(|event| event.event == "wrong").collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+    assert!(lost(&model).is_none(), "the program continues");
+}
+
 /// The empty slot of a spare is no cause and no alarm; while the spare is awake, the program is protected, and not when the understudy fails too.
 #[test]
 fn a_spare_that_is_awake_protects_and_one_that_is_away_is_no_alarm() {

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use understudy_bus::HostEvent;
-use understudy_journal::{Happening, Record, TimeOfDay};
+use understudy_journal::{Happening, Record, RunEvent, TimeOfDay};
 use understudy_view::{Alarm, Bounds, Filter, JournalText, Listing, Model, Zone};
+use understudy_wire::{Member, ProgramId};
 
 use crate::support::{cell, records, scenario};
 
@@ -92,6 +93,23 @@ fn the_journal_names_the_day_and_the_zone_once() {
     let east = text(Zone::of(east));
     assert_eq!(east.matches("2026-11-26 UTC+02:30\n").count(), 1, "{east}");
     assert!(east.contains("\n15:33:1"), "{east}");
+}
+
+/// All members are gone for eight seconds: the cycle in which the alarm was raised comes after them.
+#[test]
+fn an_alarm_of_an_outage_begins_with_it() {
+    let mut records = run(&|_| 0);
+    let gone = records.iter().position(|record| record.at_ns > 2_000_000_000).expect("later");
+    let at_ns = records[gone].at_ns;
+    let member = Member::RemoteIo(ProgramId(0));
+    let ended = RunEvent::Ended { member, how: "killed".to_owned(), said: Vec::new() };
+    records[gone..].iter_mut().for_each(|record| record.at_ns += 8_000_000_000);
+    records.insert(gone, Record::of_run(at_ns, ended));
+    let model = read(&records);
+    let alarm = model.alarms_at(i64::MAX).find(|alarm| alarm.alarm == "not-driven");
+    let alarm = alarm.expect("nobody drives the outputs");
+    assert_eq!(alarm.raised_at, Some(TimeOfDay(NOON + at_ns)));
+    assert!(alarm.over_at.is_none_or(|at| at.0 > NOON + at_ns + 7_900_000_000), "{alarm:?}");
 }
 
 /// Before a step of the clock the times stay as they were, after it they are the new ones, and the step is an event.
