@@ -87,6 +87,8 @@ fn a_type_takes_the_values_of_a_narrower_one() {
 #[test]
 fn a_type_without_all_values_of_the_old_one_takes_none() {
     for (before, now) in [
+        ("(u, v, w)", "(u, v)"),
+        ("(u, v, w)", "(w, x)"),
         ("DINT", "INT"),
         ("INT", "UINT"),
         ("UINT", "INT"),
@@ -208,7 +210,7 @@ fn the_values_of_an_enumeration_keep_their_names() {
     let old = of(&types("idle, run, stop"), declared, "m := run; k := stop;");
     let new = of(&types("idle, fill, run"), declared, "");
     let carried = after(&old, 1, &new);
-    assert_eq!(fates(&carried), ["converted m", "dropped k"]);
+    assert_eq!(fates(&carried), ["narrowed m", "dropped k"]);
     // `run` is 2 now, and the 1 of the old program would be `fill`.
     assert_eq!(["m", "k"].map(|name| stored(&new, name, &carried.state)), [2, 0]);
 }

@@ -3,7 +3,8 @@
 //! ```text
 //!   retentive in both, of one type                         kept
 //!   the same, and the type has become wider                converted: INT to DINT or REAL, WORD to DWORD, the values of an enumeration by their names
-//!   the same, and the type has become narrower             converted, where the new type has the value
+//!   the same, and the type has become narrower, or an
+//!   enumeration lacks names of before                      narrowed: converted, where the new type has the value
 //!   retentive in the new program only                      new: it has its initial value
 //!   retentive in the old program only, or of a value that
 //!   the new type does not have                             dropped
@@ -227,8 +228,8 @@ struct Spot<'p> {
 fn taken(conversion: &Conversion) -> Fate {
     match conversion {
         Conversion::Same => Fate::Kept,
-        Conversion::Narrower(..) => Fate::Narrowed,
-        Conversion::Wider(..) | Conversion::ByName(_) => Fate::Converted,
+        Conversion::Narrower(..) | Conversion::ByName(_, false) => Fate::Narrowed,
+        Conversion::Wider(..) | Conversion::ByName(_, true) => Fate::Converted,
     }
 }
 

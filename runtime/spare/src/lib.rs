@@ -18,6 +18,7 @@
 
 mod post;
 mod run;
+mod unfinished;
 mod watch;
 
 pub use run::{Duty, Report, SpareSettings, run};

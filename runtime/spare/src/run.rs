@@ -12,6 +12,7 @@ use understudy_cycle::spare::{Attention, Order, Rule, WITNESSES};
 use understudy_wire::{Member, StationId};
 
 use crate::post::Post;
+use crate::unfinished;
 use crate::watch::{Seen, Watch, Whereabouts};
 
 /// How often the end of the process is looked for when nothing happens.
@@ -84,6 +85,13 @@ pub enum Report {
         /// The flagged stations, and the cycles for which each has been.
         failed: Vec<(String, u32)>,
     },
+    /// The spare wakes in the group in which it was awake when it ended: what its station has kept may be the newest state.
+    WakesAgain {
+        /// The group.
+        group: String,
+        /// The slot that it takes.
+        slot: String,
+    },
     /// Its station publishes.
     Awake {
         /// The group.
@@ -122,6 +130,9 @@ impl fmt::Display for Report {
                     .map(|(name, cycles)| format!("{name} (flagged for {cycles} cycles)"))
                     .collect();
                 write!(formatter, "{group}: wakes as {slot}; failed: {}", failed.join(", "))
+            }
+            Self::WakesAgain { group, slot } => {
+                write!(formatter, "{group}: wakes as {slot}, as it was when it ended")
             }
             Self::Awake { group, cycles, since_failure } => write!(
                 formatter,
@@ -204,6 +215,11 @@ pub fn run(
         not_before: Instant::now(),
         woke: 0,
     };
+    if let Some(group) = unfinished::of(duties).filter(|&group| duties[group].fits) {
+        let duty = &duties[group];
+        say(&Report::WakesAgain { group: duty.group.clone(), slot: duty.slot_name.clone() });
+        keeper.start(group, say);
+    }
     while !ends.load(Ordering::Relaxed) {
         match seen.recv_timeout(TICK) {
             Ok((group, witness, what)) => keeper.saw(group, witness, what, say),
@@ -278,6 +294,7 @@ impl Keeper<'_> {
                 let cycles = standings[group].complete;
                 say(&Report::Retires { group: group_name, cycles });
                 self.sleeps();
+                unfinished::ends(&self.settings.duties[group]);
             }
         }
     }
@@ -300,12 +317,20 @@ impl Keeper<'_> {
             slot: duty.slot_name.clone(),
             failed: attention.failed().map(name).collect(),
         });
+        self.start(group, say);
+    }
+
+    /// Starts the station of the slot of a group.
+    fn start(&mut self, group: usize, say: &mut dyn FnMut(&Report)) {
+        let duty = &self.settings.duties[group];
+        // Without the file the spare sleeps after a power failure; its station reports what it does not keep.
+        let _ = unfinished::begins(duty);
         match Post::start(&self.settings.program, duty, self.settings.real_time) {
             Ok(post) => {
                 self.woke += 1;
                 self.whereabouts.set(Some(duty.group.clone()));
-                self.awake =
-                    Some(Awake { group, post, silent: silent(attention), publishes: false });
+                let silent = silent(&self.groups[group]);
+                self.awake = Some(Awake { group, post, silent, publishes: false });
             }
             Err(error) => {
                 say(&Report::Ended { group: duty.group.clone(), how: error.to_string() });

@@ -12,8 +12,8 @@ pub(super) enum Conversion {
     Wider(Elementary, Elementary),
     /// To a type that has some values of the first: this one must be among them.
     Narrower(Elementary, Elementary),
-    /// From the number of a name in one enumeration to its number in another one.
-    ByName(Vec<(u64, u64)>),
+    /// From the number of a name in one enumeration to its number in another one, and whether that has all names.
+    ByName(Vec<(u64, u64)>, bool),
 }
 
 impl Conversion {
@@ -23,7 +23,7 @@ impl Conversion {
             Self::Same => Some(stored),
             Self::Wider(from, to) => Some(widened(*from, *to, stored)),
             Self::Narrower(from, to) => narrowed(*from, *to, stored),
-            Self::ByName(numbers) => {
+            Self::ByName(numbers, _) => {
                 let mut numbers = numbers.iter();
                 numbers.find(|(before, _)| *before == stored).map(|(_, now)| *now)
             }
@@ -52,7 +52,9 @@ pub(super) fn conversion(
                 let (_, same) = now.iter().find(|(known, _)| known.eq_ignore_ascii_case(name))?;
                 Some((*number as u64 & from.mask(), *same as u64 & to.mask()))
             });
-            Some(Conversion::ByName(numbers.collect()))
+            let numbers: Vec<(u64, u64)> = numbers.collect();
+            let has_all = numbers.len() == before.len();
+            Some(Conversion::ByName(numbers, has_all))
         }
         _ => None,
     }
