@@ -14,9 +14,10 @@ mod text;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_cluster::{PlantFile, PlantSpare};
+use understudy_cluster::{PlantFile, PlantSpare, Priority};
 use understudy_cycle::Mode;
 
+use crate::model::protection::STATE_LOST;
 use crate::snapshot::{ProgramSnapshot, Snapshot, StationSnapshot};
 use crate::station::StationState;
 
@@ -138,7 +139,7 @@ pub struct SpareOverview {
 /// Something that lacks in the plant.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct PlantAlarm {
-    /// `unprotected`, `not-observed` or `spare-not-received`.
+    /// `unprotected`, `not-observed`, `spare-not-received`, or the kind of an alarm of the group.
     pub alarm: &'static str,
     /// The group or the spare.
     pub name: String,
@@ -154,9 +155,27 @@ impl PlantOverview {
         let groups: Vec<GroupOverview> = (0..plant.groups.len())
             .map(|group| group_overview(plant, group, views.get(group), &spares))
             .collect();
-        let alarms = alarms(&groups, &spares);
+        let own = plant.groups.iter().zip(views);
+        let own = own.flat_map(|(group, view)| urgent(&group.name, view));
+        let alarms = own.chain(alarms(&groups, &spares)).collect();
         Self { groups, spares, alarms }
     }
+}
+
+/// The alarms of a group that require an immediate response: what its outputs are counts more than what protects them.
+fn urgent(group: &str, view: &GroupView) -> Vec<PlantAlarm> {
+    let GroupView::Present(snapshot) = view else {
+        return Vec::new();
+    };
+    let lasting = snapshot.alarms.iter().filter(|alarm| alarm.over.is_none());
+    let urgent = lasting
+        .filter(|alarm| alarm.priority == Some(Priority::Critical) || alarm.alarm == STATE_LOST);
+    let told = urgent.map(|alarm| PlantAlarm {
+        alarm: alarm.alarm,
+        name: group.to_owned(),
+        text: format!("{group}: {}", alarm.text),
+    });
+    told.collect()
 }
 
 fn spare_overview(plant: &PlantFile, spare: &PlantSpare, views: &[GroupView]) -> SpareOverview {

@@ -75,6 +75,25 @@ impl Model {
         text
     }
 
+    /// Whoever drives the outputs, no member says so: none of those that execute programs is received.
+    pub(super) fn nobody_is_received(&mut self, cycle: i64) {
+        let members = self.cluster.members();
+        let mut tell = members.filter(|member| {
+            !matches!(member, Member::Plant(_)) && !self.cluster.is_spare_slot(*member)
+        });
+        if !tell.all(|member| self.changes.now().is_detached(member)) {
+            return;
+        }
+        for program in (0..self.cluster.controllers().len() as u8).map(ProgramId) {
+            let of = program_name(program, &self.members);
+            let text = format!(
+                "{of}: it is not known whether the outputs are driven, because nothing is received from any member: they, or the network to this viewer, have failed"
+            );
+            let name = self.members.name(Member::RemoteIo(program)).to_owned();
+            self.alarms.raise_critical((name, NOT_DRIVEN), cycle, text);
+        }
+    }
+
     fn gives_no_sign(&mut self, record: &Record, program: ProgramId, cycle: i64) {
         let name = self.members.name(Member::RemoteIo(program)).to_owned();
         let process = self.changes.now().process(Member::RemoteIo(program));

@@ -14,7 +14,7 @@ use crate::alarm::{Subject, UNPROTECTED};
 use crate::protection::{LackingStation, LostState, Protection};
 use crate::station::StationState;
 
-const STATE_LOST: &str = "state-lost";
+pub(crate) const STATE_LOST: &str = "state-lost";
 
 /// The stations that a remote I/O receives, those of them that publish for its program, and whether it receives no station at all.
 type Evidence = (StationSet, StationSet, Option<Silence>);

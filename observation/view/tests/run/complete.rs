@@ -205,6 +205,40 @@ fn a_remote_io_that_gives_no_sign_is_an_alarm_within_two_seconds_until_it_is_bac
     assert_eq!(now.remote_ios[0].state, RemoteIoState::Serving);
 }
 
+/// A plant whose power fails is far away: nobody is left to say that the outputs are not driven.
+#[test]
+fn a_cluster_of_which_nothing_is_received_is_an_alarm_until_it_is_back() {
+    let cell = cell();
+    let text = "title = \"quiet\"\ncycles = 400\n";
+    let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
+    let lasting = |model: &Model| {
+        let of_kind = model.alarms().filter(|alarm| alarm.alarm == "not-driven");
+        let of_kind = of_kind.filter(|alarm| alarm.over.is_none());
+        of_kind.map(|alarm| alarm.name.clone()).collect::<Vec<_>>()
+    };
+    let mut is_cut = false;
+    for record in records(&cell, &scenario(&cell, text), 1) {
+        if !is_cut && model.has_origin() && model.cycle() > Some(200) {
+            is_cut = true;
+            let members: Vec<Member> = cell.members().collect();
+            let is_plant = |member: &&Member| matches!(member, Member::Plant(_));
+            for &member in members.iter().filter(|member| !is_plant(member)) {
+                assert_eq!(lasting(&model), [""; 0], "one is received");
+                let reason = "the connection was refused".to_owned();
+                let detached = RunEvent::Detached { member, reason };
+                model.note(&Record::of_run(record.at_ns, detached));
+            }
+            assert_eq!(lasting(&model), ["robot-io", "press-io"]);
+            for member in members {
+                model.note(&Record::of_run(record.at_ns, RunEvent::Attached { member }));
+            }
+        }
+        model.note(&record);
+    }
+    assert!(is_cut);
+    assert_eq!(lasting(&model), [""; 0], "they are back");
+}
+
 /// The stations have its samples: only its journal is not received.
 #[test]
 fn a_remote_io_whose_journal_alone_is_missing_is_no_alarm() {

@@ -13,6 +13,33 @@ use understudy_wire::{Member, ProgramId};
 
 use crate::support::{example, model, records, scenario};
 
+/// What the outputs of a group are comes before what protects them.
+#[test]
+fn a_group_whose_outputs_are_fail_safe_says_so() {
+    let cluster = example("shared-spare/line-1");
+    let lost = scenario(&cluster, include_str!("../../../../examples/press-cell/lost-state.toml"));
+    let mut model = Model::new(Arc::new(cluster.clone()), Bounds::default());
+    let mut told = Vec::new();
+    for record in records(&cluster, &lost, 1) {
+        model.note(&record);
+        if !model.has_origin() || !matches!(record.member, Some(Member::RemoteIo(_))) {
+            continue;
+        }
+        let views = [GroupView::Present(Box::new(model.snapshot()))];
+        for alarm in PlantOverview::new(&plant(""), &views).alarms {
+            if !told.iter().any(|(kind, _)| *kind == alarm.alarm) {
+                told.push((alarm.alarm, alarm.text));
+            }
+        }
+    }
+    for (kind, wanted) in
+        [("fail-safe", "line-1: robot: fail-safe outputs"), ("state-lost", "line-1: ")]
+    {
+        let found = told.iter().find(|(of, _)| *of == kind);
+        assert!(found.is_some_and(|(_, text)| text.starts_with(wanted)), "{kind}: {told:?}");
+    }
+}
+
 /// The example, with more lines of the plant file.
 fn plant(more: &str) -> PlantFile {
     let text = include_str!("../../../../examples/shared-spare/plant.toml");
