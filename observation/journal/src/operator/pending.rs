@@ -63,6 +63,9 @@ impl PendingOrders {
     }
 }
 
+/// The code of a step that was done and is not on the disk of the member.
+const NOT_KEPT: &str = "U0633";
+
 /// An order whose outcome is known.
 #[derive(Debug)]
 pub struct DecidedOrder {
@@ -71,11 +74,12 @@ pub struct DecidedOrder {
 }
 
 impl DecidedOrder {
-    /// The step of an online change that it was, where that was done.
+    /// The step of an online change that it was, where that was done; also where the member does not keep it over its end (U0633).
     pub fn change(&self) -> Option<&ChangeRequest> {
         match &self.commanded.action {
             OperatorAction::Command { command: Command::Change { request }, .. } => {
-                self.done.as_ref().ok().map(|_| request)
+                let is_done = |refusal: &Refusal| refusal.to_string().contains(NOT_KEPT);
+                self.done.as_ref().err().is_none_or(is_done).then_some(request)
             }
             _ => None,
         }
@@ -295,6 +299,28 @@ mod tests {
             let unforced = RemoteIoEvent::Unforced { moment, signal, expired: false };
             assert_eq!(observe(&mut orders, &record(unforced)), 1);
             assert_eq!(after.try_recv(), Ok(Ok(Done::default())));
+        }
+    }
+
+    /// What a member has loaded and cannot keep on its disk counts for all who judge what it drives.
+    #[test]
+    fn a_change_that_is_not_kept_is_loaded_all_the_same() {
+        let request = ChangeRequest::Prepare { file: "change.json".to_owned() };
+        let step = request.words();
+        let not_kept = "U0633: it is done, and not kept on the disk";
+        for (said, is_loaded) in
+            [(None, true), (Some(not_kept), true), (Some("U0631: these are no texts"), false)]
+        {
+            let mut orders = PendingOrders::default();
+            let command = Command::Change { request: request.clone() };
+            let (order, _waits) = commanded(command, false);
+            orders.add(order, NAME.to_owned());
+            let refused = said.map(str::to_owned);
+            let event = Happening::Host(HostEvent::ChangeOrdered { step: step.clone(), refused });
+            let told = Record { at_ns: 1, name: NAME.to_owned(), member: Some(MEMBER), event };
+            let decided = orders.observe(&told);
+            let found = decided.first().and_then(DecidedOrder::change);
+            assert_eq!(found.is_some(), is_loaded, "{said:?}");
         }
     }
 }
