@@ -21,22 +21,10 @@ pub const SO_FAR: &str = "assumptions hold";
 
 /// The circuit with one output more, its last: whether all of `assumed`, formulas of one scan, have held so far.
 pub fn with_assumptions(circuit: &Circuit, assumed: &[Resolved]) -> Circuit {
-    let mut builder = CircuitBuilder::new(circuit.name());
-    let inputs: Vec<Expression> = circuit.inputs().iter().map(|name| builder.input(name)).collect();
-    let registers = circuit.registers().iter();
-    let registers: Vec<_> =
-        registers.map(|register| builder.register(&register.name, register.initial)).collect();
-    let next = circuit.registers().iter().map(|register| register.next);
-    let values = circuit.outputs().iter().map(|output| output.value);
-    let roots: Vec<Expression> = next.chain(values).collect();
-    let copies = builder.graph().import(circuit.graph(), &roots, |_, variable| match variable {
-        Variable::Input(input) => inputs[input as usize],
-        Variable::Register(register) => registers[register as usize].1,
-    });
-    let (next, values) = copies.split_at(registers.len());
-    for (&(register, _), &next) in registers.iter().zip(next) {
-        builder.set_next(register, next);
-    }
+    let mut builder = CircuitBuilder::like(circuit);
+    let values = builder.copy_functions(circuit, Graph::variable);
+    let inputs = (0..circuit.inputs().len() as u32).map(Variable::Input);
+    let inputs: Vec<Expression> = inputs.map(|input| builder.graph().variable(input)).collect();
     let value = |signal: &Signal| match *signal {
         Signal::Input(input) => inputs[input],
         Signal::Output(output) => values[output],
@@ -49,7 +37,7 @@ pub fn with_assumptions(circuit: &Circuit, assumed: &[Resolved]) -> Circuit {
         all = graph.and(all, holds);
     }
     builder.set_next(before, all);
-    for (output, &value) in circuit.outputs().iter().zip(values) {
+    for (output, value) in circuit.outputs().iter().zip(values) {
         builder.output(&output.name, value);
     }
     builder.output(SO_FAR, all);

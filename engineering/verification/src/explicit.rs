@@ -19,9 +19,8 @@ use lanes::{LANES, Lanes};
 /// Inputs past which nothing is listed: every state has 2^|u| ways on.
 pub const MAXIMUM_INPUTS: usize = 12;
 
-/// Registers that are listed at most, whatever the bound: so many, or more where they need little memory.
+/// Registers that are listed, whatever the bound: a few hundred bytes each.
 const MAXIMUM_COUNT: usize = 1 << 20;
-const MEMORY: usize = 1 << 28;
 
 /// Why there is no list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -149,14 +148,11 @@ impl Explicit {
         let mut known_registers: HashTable<u32> = HashTable::new();
         let hash = |words: &[u64]| hasher.hash_one(words);
         known_registers.insert_unique(hash(&listed.registers), 0, |_| 0);
-        // Its words, its origin, its hash, and where each scan leads.
-        let bytes = 8 * width + 16 + 4 * listed.ways;
-        let most = MAXIMUM_COUNT.max(MEMORY / bytes);
         let mut lanes = Lanes::default();
         let mut first = 0;
         while first < listed.states() {
             let known = listed.states().min(bound / listed.ways * listed.ways);
-            if known <= first || listed.origins.len() > most {
+            if known <= first || listed.origins.len() > MAXIMUM_COUNT {
                 return (listed, Some(ExplicitError::States { bound }));
             }
             let from = first / listed.ways;

@@ -27,7 +27,7 @@ use crate::symbolic::{Resolved, Signal, Trace, resolve};
 
 pub use conclusion::Conclusion;
 pub use remarks::{Remark, Remarks};
-pub(crate) use sampled::{mixed, words};
+pub(crate) use sampled::words;
 use stages::Stages;
 pub use stages::Undecided;
 pub use unasked::{Lamp, OutputFinding};

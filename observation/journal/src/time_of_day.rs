@@ -138,7 +138,7 @@ impl TimesOfDay {
         u64::try_from(unix_ns).ok().map(TimeOfDay)
     }
 
-    /// The time of day of a record of whoever runs all members on one host.
+    /// The time of day of a record of the laboratory, whose members run on one host with it.
     pub fn of_host(&self, at_ns: u64) -> Option<TimeOfDay> {
         self.of_record(self.reference.as_deref()?, at_ns)
     }

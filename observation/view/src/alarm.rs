@@ -112,10 +112,12 @@ impl Alarm {
     pub(crate) fn timed(self, times: &TimesOfDay) -> Self {
         let of = |cycle: Option<i64>| times.of_cycle(cycle?);
         // Where all members stood still, the cycle of the alarm came long after the record that raised it.
-        let recorded = self.raised_at.zip(of(Some(self.cycle)));
-        let recorded = recorded.filter(|(then, of)| of.0.saturating_sub(then.0) > PAUSE_NS);
+        let raised_at = of(Some(self.cycle)).map(|of| match self.raised_at {
+            Some(then) if of.0.saturating_sub(then.0) > PAUSE_NS => then,
+            _ => of,
+        });
         Self {
-            raised_at: recorded.map(|(then, _)| then).or_else(|| of(Some(self.cycle))),
+            raised_at,
             over_at: of(self.over),
             acknowledged_at: of(self.acknowledged_in),
             ..self
@@ -163,6 +165,9 @@ impl Alarm {
 
 /// Alarm of a station without which programs are not protected.
 pub(crate) const UNPROTECTED: &str = "unprotected";
+
+/// Alarm of a program whose state is lost.
+pub(crate) const STATE_LOST: &str = "state-lost";
 
 /// Alarm of stations whose outputs or states are wrong.
 pub(crate) const VALUE_FAULT: &str = "value-fault";

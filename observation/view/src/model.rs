@@ -11,7 +11,7 @@ mod pairs;
 mod past;
 mod process_alarms;
 mod programs;
-pub(crate) mod protection;
+mod protection;
 mod reports;
 mod run_events;
 mod silence;

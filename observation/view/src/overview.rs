@@ -17,7 +17,7 @@ use serde::Serialize;
 use understudy_cluster::{PlantFile, PlantSpare, Priority};
 use understudy_cycle::Mode;
 
-use crate::model::protection::STATE_LOST;
+use crate::alarm::STATE_LOST;
 use crate::snapshot::{ProgramSnapshot, Snapshot, StationSnapshot};
 use crate::station::StationState;
 

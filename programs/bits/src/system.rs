@@ -102,7 +102,7 @@ pub(crate) enum Begins {
     Initially,
     /// The values of a state.
     In(Vec<u64>),
-    /// At most these numbers; any where that is nothing. All others begin with their initial values.
+    /// At most these numbers; any number without one. All others begin with their initial values.
     AtMost(BTreeMap<u64, Option<i64>>),
 }
 

@@ -134,6 +134,33 @@ impl CircuitBuilder {
         Self { name: name.into(), ..Self::default() }
     }
 
+    /// The inputs and registers of a circuit, in the places that they have there, for a circuit that differs little from it.
+    pub fn like(circuit: &Circuit) -> Self {
+        let mut builder = Self::new(circuit.name());
+        for input in &circuit.inputs {
+            builder.input(input);
+        }
+        for register in &circuit.registers {
+            builder.register(&register.name, register.initial);
+        }
+        builder
+    }
+
+    /// Copies the functions of the circuit that this one is [`Self::like`], with each variable replaced by what `place` gives for it: f of its registers is
+    /// set; answers with h of its outputs.
+    pub fn copy_functions(
+        &mut self,
+        circuit: &Circuit,
+        place: impl FnMut(&mut Graph, Variable) -> Expression,
+    ) -> Vec<Expression> {
+        let mut copies = self.graph.import(&circuit.graph, &circuit.roots(), place);
+        let values = copies.split_off(circuit.registers.len());
+        for (register, next) in self.registers.iter_mut().zip(copies) {
+            register.2 = Some(next);
+        }
+        values
+    }
+
     /// Where its expressions are made.
     pub fn graph(&mut self) -> &mut Graph {
         &mut self.graph

@@ -1,5 +1,5 @@
 //! Where a spare is awake, as a file beside what its station keeps: after a power failure its folder may have the newest state of a group, of which
-//! nobody else can know.
+//! no other member can know.
 
 use std::fs::{self, File};
 use std::io;
@@ -18,12 +18,11 @@ fn file(duty: &Duty) -> Option<PathBuf> {
 /// # Errors
 /// The file is not written.
 pub(crate) fn begins(duty: &Duty) -> io::Result<()> {
-    let Some(file) = file(duty) else {
+    let (Some(folder), Some(file)) = (&duty.retain, file(duty)) else {
         return Ok(());
     };
-    let folder = file.parent().map(ToOwned::to_owned).unwrap_or_default();
-    fs::create_dir_all(&folder)?;
-    File::create(&file)?.sync_all()?;
+    fs::create_dir_all(folder)?;
+    File::create(file)?.sync_all()?;
     File::open(folder)?.sync_all()
 }
 

@@ -55,9 +55,7 @@ impl<'c> Unrolling<'c> {
         let mut solver = Solver::new(SolverOpts::default(), patience);
         let one = Lit::new(solver.new_var_default(), true);
         solver.add_clause_reuse(&mut vec![one]);
-        let registers: Vec<u32> = (0..circuit.registers().len() as u32)
-            .filter(|&register| cone.variables.contains(&Variable::Register(register)))
-            .collect();
+        let registers: Vec<u32> = cone.registers().collect();
         let first = registers.iter().map(|&register| {
             if !from_start {
                 return Lit::new(solver.new_var_default(), true);
@@ -68,8 +66,8 @@ impl<'c> Unrolling<'c> {
         Self { circuit, solver, one, registers, before, inputs: Vec::new(), made: Vec::new() }
     }
 
-    /// A first scan of a state in which these registers are equal, added to their first values, and after which some are not: those that are 1 after it.
-    /// An absent one is the constant 0. Nothing where there is none, and where that takes too long.
+    /// Searches a first scan before which each of these pairs of registers is equal, added to their first values, and after which some pair is not; an
+    /// absent register is the constant 0. `Some(None)` where there is no such scan, else those that are 1 after it; `None` where the search takes too long.
     pub(super) fn difference(
         &mut self,
         equal: &[(usize, Option<usize>)],

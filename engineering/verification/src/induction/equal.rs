@@ -13,11 +13,11 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 
-use understudy_logic::{Circuit, CircuitBuilder, Expression, Scan, Scratch, Variable};
+use understudy_logic::{Circuit, CircuitBuilder, Scan, Scratch, Variable};
 
 use super::clauses::{Patience, Unrolling};
 use crate::effort::ALWAYS;
-use crate::program::mixed;
+use crate::random::mixed;
 use crate::symbolic::Cone;
 
 /// Rounds of scans at random that split nothing, after which the solver goes on.
@@ -29,28 +29,20 @@ const STEPS: u64 = 20_000;
 /// The same circuit, in which of equal registers one alone is read; its signals have the places that they had.
 pub(crate) fn reduced(circuit: &Circuit) -> Circuit {
     let parts = Parts::of(circuit);
-    let mut builder = CircuitBuilder::new(circuit.name());
-    let inputs: Vec<Expression> = circuit.inputs().iter().map(|name| builder.input(name)).collect();
-    let registers = circuit.registers().iter();
-    let registers: Vec<_> =
-        registers.map(|register| builder.register(&register.name, register.initial)).collect();
-    let copies = builder.graph().import(circuit.graph(), &circuit.roots(), |graph, of| match of {
-        Variable::Input(input) => inputs[input as usize],
-        Variable::Register(register) => {
-            let initial = |place: usize| circuit.registers()[place].initial;
-            let register = register as usize;
-            match parts.0[register] {
-                None => graph.constant(initial(register)),
-                Some(first) if initial(first) == initial(register) => registers[first].1,
-                Some(first) => graph.not(registers[first].1),
-            }
-        }
+    let mut builder = CircuitBuilder::like(circuit);
+    let values = builder.copy_functions(circuit, |graph, variable| {
+        let Variable::Register(register) = variable else {
+            return graph.variable(variable);
+        };
+        let initial = |place: usize| circuit.registers()[place].initial;
+        let register = register as usize;
+        let Some(first) = parts.0[register] else {
+            return graph.constant(initial(register));
+        };
+        let value = graph.variable(Variable::Register(first as u32));
+        if initial(first) == initial(register) { value } else { graph.not(value) }
     });
-    let (next, values) = copies.split_at(registers.len());
-    for (&(register, _), &next) in registers.iter().zip(next) {
-        builder.set_next(register, next);
-    }
-    for (output, &value) in circuit.outputs().iter().zip(values) {
+    for (output, value) in circuit.outputs().iter().zip(values) {
         builder.output(&output.name, value);
     }
     builder.finish().expect("the names are those of a circuit")
@@ -147,7 +139,7 @@ fn often_equal(random: &mut u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use understudy_logic::{Operation, Running};
+    use understudy_logic::{Expression, Operation, Running};
 
     use super::*;
 

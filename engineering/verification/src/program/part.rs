@@ -8,13 +8,14 @@ use crate::symbolic::{Cone, Resolved, Signal};
 pub(super) struct Part {
     pub(super) circuit: Circuit,
     pub(super) property: Resolved,
-    /// The inputs of the part, by their places in the whole, which has so many.
+    /// The inputs of the part, by their places in the whole.
     inputs: Vec<usize>,
+    /// Number of inputs of the whole.
     count: usize,
 }
 
 impl Part {
-    /// Of `cone`, which is that of `property`.
+    /// The part of `whole` with the variables of `cone`, which is that of `property`.
     pub(super) fn of(whole: &Circuit, cone: &Cone, property: &Resolved) -> Self {
         let mut builder = CircuitBuilder::new(whole.name());
         let (mut inputs, mut registers) = (Vec::new(), Vec::new());

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use understudy_logic::{Circuit, CircuitBuilder, Expression};
+use understudy_logic::{Circuit, CircuitBuilder, Expression, Graph};
 
 use understudy_ladder::{Program, Write};
 
@@ -56,22 +56,8 @@ struct Moment {
 impl Questions {
     /// `circuit` and `writes` are those of [`Program::lower_writes`].
     pub(super) fn of(program: &Program, circuit: &Circuit, writes: &[Write]) -> Self {
-        let mut builder = CircuitBuilder::new(circuit.name());
-        for input in circuit.inputs() {
-            builder.input(input);
-        }
-        let registers = circuit.registers().iter();
-        let registers: Vec<_> = registers
-            .map(|register| builder.register(&register.name, register.initial).0)
-            .collect();
-        let roots = circuit.roots();
-        let copies = builder
-            .graph()
-            .import(circuit.graph(), &roots, |graph, variable| graph.variable(variable));
-        let (next, values) = copies.split_at(registers.len());
-        for (register, &next) in registers.into_iter().zip(next) {
-            builder.set_next(register, next);
-        }
+        let mut builder = CircuitBuilder::like(circuit);
+        let values = builder.copy_functions(circuit, Graph::variable);
         let coil = |write: &Write| &program.rungs[write.rung].coils[write.coil];
         let graph = builder.graph();
         let moments: Vec<Moment> = writes

@@ -5,6 +5,7 @@ use std::array;
 use understudy_logic::{Circuit, Scan, Scratch};
 
 use crate::property::Formula;
+use crate::random::mixed;
 use crate::symbolic::{Resolved, Signal};
 
 /// Scans of each of the 64 runs.
@@ -79,15 +80,6 @@ fn flips(random: &mut u64) -> u64 {
     let seldom = often & draw() & draw();
     let rarely = seldom & draw() & draw();
     often & 0xffff_ffff | seldom & 0xffff << 32 | rarely & 0xffff << 48
-}
-
-/// The next word of SplitMix64.
-pub(crate) fn mixed(random: &mut u64) -> u64 {
-    *random = random.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut word = *random;
-    word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    word ^ (word >> 31)
 }
 
 /// In which runs the formula holds; what speaks of more than one scan holds in none.

@@ -23,7 +23,6 @@ use crate::effort::{Stopped, Work};
 use crate::explicit::{Explicit, ExplicitError};
 use crate::induction::{Depth, Induction, invariant, prove_always, search};
 use crate::symbolic::{Checker, Cone, Resolved, Verdict, rows};
-use understudy_logic::Variable;
 
 /// Nodes of the first and the second try.
 const NODES: [usize; 2] = [1 << 17, 1 << 20];
@@ -173,16 +172,18 @@ impl<'s, 'b> Stages<'s, 'b> {
 
     /// Each property by a list of the states of what it depends on.
     fn list_parts(&mut self) {
+        if !self.fair.is_empty() {
+            return;
+        }
         let whole = self.subject.reduced();
         let mut larger = 0;
         for place in self.left() {
             let property = &self.properties[place];
             let cone = Cone::of(whole, [property]);
-            let is_input = |variable: &&Variable| matches!(variable, Variable::Input(_));
-            let inputs = cone.variables.iter().filter(is_input).count();
-            let registers = cone.variables.len() - inputs;
+            let registers = cone.registers().count();
+            let inputs = cone.variables.len() - registers;
             let is_listed = REGISTERS.contains(&registers) && inputs <= INPUTS;
-            if !self.fair.is_empty() || !is_listed || larger >= REFUSED {
+            if !is_listed || larger >= REFUSED {
                 continue;
             }
             let part = Part::of(whole, &cone, property);
@@ -221,13 +222,8 @@ impl<'s, 'b> Stages<'s, 'b> {
                 continue;
             };
             let cone = Cone::of(circuit, [kept]);
-            let registers = cone.variables.iter();
-            let registers: Vec<_> = registers
-                .filter_map(|variable| match variable {
-                    Variable::Register(register) => Some(&circuit.registers()[*register as usize]),
-                    Variable::Input(_) => None,
-                })
-                .collect();
+            let registers = cone.registers().map(|place| &circuit.registers()[place as usize]);
+            let registers: Vec<_> = registers.collect();
             if registers.len() < LARGE {
                 continue;
             }

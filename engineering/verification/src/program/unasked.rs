@@ -1,7 +1,7 @@
 //! What is asked of every ladder: each output can be switched on and off, again and again. The specification of the paper on the deployment
 //! of controllers (its section 4.3 and appendix 2) is `AG (EF y & EF !y)` for every output y.
 
-use understudy_logic::{CircuitBuilder, Expression, Variable};
+use understudy_logic::{CircuitBuilder, Variable};
 
 use super::{Answer, Bounds, Subject};
 use crate::property::Formula;
@@ -50,31 +50,23 @@ impl Subject {
     fn settling(&self) -> (Self, Signal) {
         const SETTLED: &str = "no more restarts";
         let circuit = &self.circuit;
-        let mut builder = CircuitBuilder::new(circuit.name());
-        let mut inputs: Vec<Expression> =
-            circuit.inputs().iter().map(|input| builder.input(input)).collect();
+        let mut builder = CircuitBuilder::like(circuit);
         let settles = builder.input(SETTLED);
-        let registers = circuit.registers().iter();
-        let registers: Vec<_> =
-            registers.map(|register| builder.register(&register.name, register.initial)).collect();
         let (settled, was_settled) = builder.register(SETTLED, false);
         let graph = builder.graph();
         let is_settled = graph.or(was_settled, settles);
         let restarts = graph.not(is_settled);
-        for &input in &self.restarting {
-            inputs[input] = graph.and(inputs[input], restarts);
-        }
-        let roots = circuit.roots();
-        let copies = graph.import(circuit.graph(), &roots, |_, variable| match variable {
-            Variable::Input(input) => inputs[input as usize],
-            Variable::Register(register) => registers[register as usize].1,
+        let values = builder.copy_functions(circuit, |graph, variable| {
+            let value = graph.variable(variable);
+            match variable {
+                Variable::Input(input) if self.restarting.contains(&(input as usize)) => {
+                    graph.and(value, restarts)
+                }
+                _ => value,
+            }
         });
-        let (next, values) = copies.split_at(registers.len());
-        for (&(register, _), &next) in registers.iter().zip(next) {
-            builder.set_next(register, next);
-        }
         builder.set_next(settled, is_settled);
-        for (output, &value) in circuit.outputs().iter().zip(values) {
+        for (output, value) in circuit.outputs().iter().zip(values) {
             builder.output(&output.name, value);
         }
         builder.output(SETTLED, is_settled);

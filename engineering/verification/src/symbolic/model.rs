@@ -40,7 +40,7 @@ impl Cone {
         cone
     }
 
-    /// Of some registers.
+    /// What some registers depend on, they included.
     pub(crate) fn of_registers(circuit: &Circuit, registers: &[usize]) -> Self {
         let mut cone = Self::default();
         let own = registers.iter().map(|&register| Variable::Register(register as u32));
@@ -65,6 +65,14 @@ impl Cone {
             }
             pending.extend(operation.operands());
         }
+    }
+
+    /// Its registers, ascending.
+    pub(crate) fn registers(&self) -> impl Iterator<Item = u32> {
+        self.variables.iter().filter_map(|variable| match variable {
+            Variable::Register(register) => Some(*register),
+            Variable::Input(_) => None,
+        })
     }
 
     /// The signals that it is about, then the other inputs that they depend on.
@@ -118,14 +126,7 @@ impl<'c> Model<'c> {
         go_on: GoOn<'c>,
     ) -> Result<Self, Stopped> {
         let graph = circuit.graph();
-        let registers: Vec<u32> = cone
-            .variables
-            .iter()
-            .filter_map(|variable| match variable {
-                Variable::Register(register) => Some(*register),
-                Variable::Input(_) => None,
-            })
-            .collect();
+        let registers: Vec<u32> = cone.registers().collect();
         let diagrams = diagrams(order(circuit, &cone, &registers));
         diagrams.expect(USUAL * registers.len());
         let inputs = cone.variables.iter().copied();

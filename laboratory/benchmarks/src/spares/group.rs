@@ -115,7 +115,7 @@ pub(super) struct Group {
     processes: BTreeMap<String, Child>,
     /// By program: what its remote I/O has reported.
     counts: Vec<Arc<Mutex<Counts>>>,
-    /// Of its stations.
+    /// Stalls that its stations have reported.
     stalls: Arc<AtomicU64>,
 }
 

@@ -76,7 +76,7 @@ struct Vacant {
     by_failure: bool,
 }
 
-/// A failure of the system: when, and by what; by its stations where that is nothing.
+/// A failure of the system: when, and by what; without a cause its stations have failed.
 pub(super) type SystemFailed = (Time, Option<String>);
 
 pub(super) struct Parts<'a> {

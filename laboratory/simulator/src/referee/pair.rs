@@ -12,6 +12,7 @@ use understudy_cycle::Versions;
 use understudy_remote_io::Event;
 use understudy_wire::{Image, Lineage, Member, Moment, Source, Step, Time};
 
+use super::steps::scan;
 use super::{Referee, Violation};
 
 /// Samples that do not count yet, at most, for ten minutes of 10 ms cycles; the oldest are forgotten.
@@ -145,10 +146,7 @@ impl Referee {
         let mut bits = before.bits.clone();
         let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
         let executable = &versions.of(program)?.executable;
-        let mut outputs = Image::zero(executable.output_count());
-        let words = (bits.words_mut(), inputs.words(), outputs.words_mut());
-        executable.step(&mut self.scratch, words.0, words.1, words.2);
-        Some(outputs)
+        Some(scan(executable, &mut self.scratch, &mut bits, inputs))
     }
 
     /// Takes the samples that lead to a lineage, where they did not count yet.

@@ -1,6 +1,7 @@
 //! The steps of the reference run, across change marks, and those of samples that have no record.
 
 use understudy_cycle::Versions;
+use understudy_executable::{Executable, Scratch};
 use understudy_wire::{Image, Lineage, Moment, ProgramHash, Step};
 
 use super::{RECENT_STATES, Referee, State};
@@ -55,14 +56,20 @@ impl Referee {
             };
             bits = converted;
         }
-        let mut outputs = Image::zero(program.executable.output_count());
-        program.executable.step(
-            &mut self.scratch,
-            bits.words_mut(),
-            step.inputs.words(),
-            outputs.words_mut(),
-        );
+        let outputs = scan(&program.executable, &mut self.scratch, &mut bits, &step.inputs);
         self.remember(moment, (hash, lineage.after_step(step)), bits);
         self.truth = Some((moment, outputs));
     }
+}
+
+/// x(t+1) in place of x(t), and h(x(t), u(t)).
+pub(super) fn scan(
+    executable: &Executable,
+    scratch: &mut Scratch,
+    state: &mut Image,
+    inputs: &Image,
+) -> Image {
+    let mut outputs = Image::zero(executable.output_count());
+    executable.step(scratch, state.words_mut(), inputs.words(), outputs.words_mut());
+    outputs
 }

@@ -75,8 +75,8 @@ impl Model {
         text
     }
 
-    /// Whoever drives the outputs, no member says so: none of those that execute programs is received.
-    pub(super) fn nobody_is_received(&mut self, cycle: i64) {
+    /// No member says whether the outputs are driven, where none of those that execute programs is received.
+    pub(super) fn nothing_is_received(&mut self, cycle: i64) {
         let members = self.cluster.members();
         let mut tell = members.filter(|member| {
             !matches!(member, Member::Plant(_)) && !self.cluster.is_spare_slot(*member)

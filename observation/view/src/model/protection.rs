@@ -10,11 +10,9 @@ use super::Model;
 use super::pairs::PARTNER_LOST;
 use super::silence::{NOT_RECEIVED, Silence};
 use super::standing::{Change, ProgramChange, Standing};
-use crate::alarm::{Subject, UNPROTECTED};
+use crate::alarm::{STATE_LOST, Subject, UNPROTECTED};
 use crate::protection::{LackingStation, LostState, Protection};
 use crate::station::StationState;
-
-pub(crate) const STATE_LOST: &str = "state-lost";
 
 /// The stations that a remote I/O receives, those of them that publish for its program, and whether it receives no station at all.
 type Evidence = (StationSet, StationSet, Option<Silence>);

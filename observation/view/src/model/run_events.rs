@@ -75,7 +75,7 @@ impl Model {
             }
             RunEvent::Detached { member, .. } => {
                 self.changes.push(cycle, Change::Detached(*member));
-                self.nobody_is_received(cycle);
+                self.nothing_is_received(cycle);
             }
             RunEvent::Commanded {
                 member: Member::RemoteIo(program) | Member::Twin(program),

@@ -205,7 +205,7 @@ fn a_remote_io_that_gives_no_sign_is_an_alarm_within_two_seconds_until_it_is_bac
     assert_eq!(now.remote_ios[0].state, RemoteIoState::Serving);
 }
 
-/// A plant whose power fails is far away: nobody is left to say that the outputs are not driven.
+/// The power of a plant far away fails: no member is left to say that the outputs are not driven.
 #[test]
 fn a_cluster_of_which_nothing_is_received_is_an_alarm_until_it_is_back() {
     let cell = cell();

@@ -50,7 +50,7 @@ fn a_loss_of_protection_and_of_a_state_are_alarms_with_their_causes() {
     insta::assert_snapshot!("protection", changes(cell, &records).join("\n"));
 }
 
-/// A program goes back to an older state, because a person has chosen it: that is no fault of anybody.
+/// A program goes back to an older state, because a person has chosen it: that is no fault.
 #[test]
 fn a_state_that_a_person_has_chosen_is_not_wrong() {
     let cell = cell();

@@ -107,7 +107,7 @@ fn an_alarm_of_an_outage_begins_with_it() {
     records.insert(gone, Record::of_run(at_ns, ended));
     let model = read(&records);
     let alarm = model.alarms_at(i64::MAX).find(|alarm| alarm.alarm == "not-driven");
-    let alarm = alarm.expect("nobody drives the outputs");
+    let alarm = alarm.expect("no member drives the outputs");
     assert_eq!(alarm.raised_at, Some(TimeOfDay(NOON + at_ns)));
     assert!(alarm.over_at.is_none_or(|at| at.0 > NOON + at_ns + 7_900_000_000), "{alarm:?}");
 }
