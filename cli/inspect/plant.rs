@@ -18,8 +18,8 @@ use crate::plants;
 /// Time between two attempts to attach to a group.
 const AGAIN: Duration = Duration::from_secs(5);
 
-/// Maximum wait for the first cycle of every group.
-const HEARD_FOR: Duration = Duration::from_secs(20);
+/// Maximum wait for the first cycle of every group that is attached.
+const HEARD_FOR: Duration = Duration::from_secs(5);
 
 /// Time in which all members of a remote cluster have reported.
 const ALL_SAY: Duration = Duration::from_secs(1);

@@ -71,8 +71,50 @@ struct KeptValue {
     /// Type in the program of the cluster.
     #[serde(skip_serializing_if = "Option::is_none")]
     now: Option<String>,
-    /// The kept value, or the initial one of a new path; null where it has parts.
+    /// The kept values, or the initial ones of a new path.
+    #[serde(flatten)]
+    values: Values,
+}
+
+/// Parts of a value that are shown, at most.
+const MOST_PARTS: usize = 1000;
+
+/// Values of a path.
+#[derive(Serialize)]
+struct Values {
+    /// That of a path without parts; null otherwise.
     value: Option<String>,
+    /// Those of its parts, the first of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    parts: Vec<PartValue>,
+    /// Whether there are more parts.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    more: bool,
+}
+
+#[derive(Serialize)]
+struct PartValue {
+    path: String,
+    value: String,
+}
+
+impl Values {
+    fn of(program: &Program, path: &str, state: &[u64]) -> Self {
+        let Some(part) = program.part(path) else {
+            return Self { value: None, parts: Vec::new(), more: false };
+        };
+        if let value @ Some(_) = part.text(state) {
+            return Self { value, parts: Vec::new(), more: false };
+        }
+        let leaves = program.leaves(part, MOST_PARTS + 1);
+        let more = leaves.len() > MOST_PARTS;
+        let leaves = leaves.into_iter().take(MOST_PARTS);
+        let parts = leaves.filter_map(|part| {
+            let value = part.text(state)?;
+            Some(PartValue { path: part.name, value })
+        });
+        Self { value: None, parts: parts.collect(), more }
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
@@ -115,7 +157,7 @@ impl Kept {
         });
         let mut kept = Self {
             name: files.name().to_owned(),
-            cycle: notes.newest.as_ref().map(|note| note.applied().cycle.0),
+            cycle: notes.newest.as_ref().and_then(|note| Some(note.applied()?.cycle.0)),
             program: None,
             values: Vec::new(),
             problems: problems.collect(),
@@ -146,17 +188,13 @@ impl Kept {
         let state = last_state(&before, run)
             .ok_or_else(|| of_path("its program has another state".to_owned()))?;
         let typed_state = before.typed_state(state.words());
-        let value_of = |program: &Program, path: &str, state: &[u64]| {
-            let (of, stored) = program.part(path)?.stored(state)?;
-            Some(of.text(stored))
-        };
         let Some(cluster) = cluster else {
             let names = before.typed().retentive_names();
             self.values.extend(names.into_iter().map(|path| KeptValue {
                 fate: None,
                 before: before.typed().part(&path).map(|it| before.typed().type_name(&it.of)),
                 now: None,
-                value: value_of(before.typed(), &path, &typed_state),
+                values: Values::of(before.typed(), &path, &typed_state),
                 path,
             }));
             return Ok(());
@@ -167,9 +205,9 @@ impl Kept {
         let initial = code.typed().initial_state();
         self.values.extend(carried.paths.into_iter().map(|path| KeptValue {
             fate: Some(path.fate.name()),
-            value: match path.fate {
-                Fate::New => value_of(code.typed(), &path.path, &initial),
-                _ => value_of(before.typed(), &path.path, &typed_state),
+            values: match path.fate {
+                Fate::New => Values::of(code.typed(), &path.path, &initial),
+                _ => Values::of(before.typed(), &path.path, &typed_state),
             },
             before: path.before,
             now: path.now,
@@ -187,7 +225,9 @@ impl Kept {
             (None, _) => format!("{}  no record\n", self.name),
         };
         let width = self.values.iter().map(|value| value.path.len()).max().unwrap_or(0);
-        for KeptValue { path, fate, before, now, value } in &self.values {
+        for KeptValue { path, fate, before, now, values: Values { value, parts, more } } in
+            &self.values
+        {
             let fate = fate.map_or(String::new(), |fate| format!("{fate:9}  "));
             let of = match (before, now) {
                 (Some(before), Some(now)) if before != now => format!("{before} → {now}"),
@@ -197,6 +237,12 @@ impl Kept {
             let value = value.as_ref().map_or(String::new(), |value| format!("  {value}"));
             let line = format!("  {fate}{path:width$}  {of}{value}");
             writeln!(text, "{}", line.trim_end()).expect("a string takes everything");
+            for PartValue { path, value } in parts {
+                writeln!(text, "    {path}  {value}").expect("a string takes everything");
+            }
+            if *more {
+                writeln!(text, "    …").expect("a string takes everything");
+            }
         }
         let dropped = self.values.iter().filter(|value| value.fate == Some("dropped")).count();
         if dropped > 0 {

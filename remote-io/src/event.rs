@@ -141,12 +141,12 @@ pub enum Event {
         /// The station that returned.
         from: StationId,
     },
-    /// The operator chose a state that is not the newest available one, or where no choice was asked for.
+    /// The operator chose a state that is not the newest available one, or where no choice was asked for; or released what waits for a choice.
     ChoiceRefused {
         /// Current cycle.
         moment: Moment,
-        /// Cycle of the newest available state, where a choice is asked for.
-        newest: Option<Moment>,
+        /// Why.
+        refusal: OrderRefusal,
     },
     /// The failure of one station would be masked from now on.
     Protected {

@@ -315,6 +315,13 @@ impl RemoteIo {
             self.report(Event::Released { moment });
             return self.choose(StateChoice::Newest { cycle: None });
         }
+        let waits_for_choice = self.question.is_some();
+        let has_effect = self.program == Execution::Stopped
+            || self.authority == Authority::Operator
+            || !self.trust.is_complete();
+        if waits_for_choice && !has_effect {
+            return self.refuse_choice(OrderRefusal::WaitsForChoice);
+        }
         self.knowledge.pardon();
         self.diagnosing.release();
         if self.program == Execution::Stopped {

@@ -25,6 +25,7 @@ impl Laboratory<'_> {
                 | Command::Force(_)
                 | Command::Unforce { .. }
                 | Command::Choose { .. }
+                | Command::Release
                 | Command::Change { .. }
         );
         let done = self.obey_command(member, &command).await;

@@ -19,7 +19,7 @@ use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
     Audience, Configurations, Field, Frame, Header, Member, ProgramId, ProgramSet, StationId,
-    StationSet, Time, Write,
+    StationSet, Time,
 };
 
 use crate::disk::Disks;
@@ -209,10 +209,14 @@ impl Simulation {
         self.links.reseed(seed);
     }
 
-    /// A request of an operator reaches the remote I/O of a program now; without effect while that is down.
-    pub fn write(&mut self, program: ProgramId, write: &Write, observe: &mut Observe<'_>) {
-        let input = Input::RemoteIo(RemoteIoInput::Write(write));
-        self.give(Member::RemoteIo(program), input, observe);
+    /// An order of an operator reaches the remote I/O of a program now; without effect while that is down.
+    pub fn order(
+        &mut self,
+        program: ProgramId,
+        order: RemoteIoInput<'_>,
+        observe: &mut Observe<'_>,
+    ) {
+        self.give(Member::RemoteIo(program), Input::RemoteIo(order), observe);
     }
 
     /// The network is another one while `disturbance` lasts; a later one takes its place.

@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use understudy_cluster::read;
+use understudy_cycle::RemoteIoInput;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, parts};
 use understudy_testing::COUNTER;
@@ -154,6 +155,27 @@ fn the_start_after_a_power_failure_is_as_configured() {
         assert_eq!((seen.cold.len(), seen.warm.len(), seen.asked), (cold, 0, asked), "{restart}");
         // A cold start that is configured loses nothing that was to be kept.
         assert_eq!(seen.cold.last(), Some(&None), "{restart}");
+    }
+}
+
+/// Nobody releases the outputs between two power failures: what was kept meanwhile is the newest state, and nothing is behind the plant.
+#[test]
+fn a_second_power_failure_before_the_release_loses_nothing() {
+    for up in 1..100 {
+        let mut simulation = simulation("release = \"operator\"\n", 1);
+        let started = run(&mut simulation, 0);
+        assert_eq!((started.cold.len(), started.applied.len()), (1, 0), "{up}");
+        simulation.order(ProgramId(0), RemoteIoInput::Release, &mut |_, _, _, _| {});
+        fail_and_return(&mut simulation, &ALL, 100, 50);
+        fail_and_return(&mut simulation, &ALL, 150 + up, 50);
+        simulation.schedule(fault((320, 0.5), REMOTE_IO, Action::Release));
+        let seen = run(&mut simulation, 400);
+        assert_eq!(simulation.violations(), [], "{up}");
+        assert!(seen.warm.iter().all(|lost| *lost == Some(0)), "{up}: {:?}", seen.warm);
+        assert_eq!((seen.cold.len(), seen.asked), (0, 0), "{up}");
+        assert!(!seen.goes_back(), "{up}");
+        let (total, since) = *seen.applied.last().expect("it was released");
+        assert!((80..260).contains(&since) && total > 300, "{up}: {total}, {since}");
     }
 }
 

@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use understudy_cluster::read;
+use understudy_cycle::RemoteIoInput;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation, Violation, parts};
 use understudy_wire::{Image, Member, ProgramId, Role, StationId, Write, WriteId};
@@ -85,7 +86,7 @@ impl Bench {
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
         };
-        self.simulation.write(PROGRAM, &write, &mut |_, _, _, _| {});
+        self.simulation.order(PROGRAM, RemoteIoInput::Write(&write), &mut |_, _, _, _| {});
     }
 
     fn fault(&mut self, member: Member, action: Action, phase: f64) {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 use understudy_cluster::read;
+use understudy_cycle::RemoteIoInput;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation, parts};
 use understudy_wire::{
@@ -165,7 +166,7 @@ impl Bench {
     fn write_to(&mut self, program: ProgramId, write: &Write) {
         let seen = &mut self.seen;
         let mut observe = |_, _, member, record: Record<'_>| seen.observe(member, record);
-        self.simulation.write(program, write, &mut observe);
+        self.simulation.order(program, RemoteIoInput::Write(write), &mut observe);
     }
 
     fn far_seen(&self) -> f32 {

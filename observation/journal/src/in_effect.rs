@@ -10,7 +10,7 @@ use understudy_node::Event as Station;
 use understudy_plant::Event as Plant;
 use understudy_remote_io::Event as RemoteIo;
 use understudy_simulator::Action;
-use understudy_wire::{Member, Part};
+use understudy_wire::{Member, OrderRefusal, Part};
 
 use crate::record::{Happening, Record, RunEvent};
 use crate::rules::Process;
@@ -151,6 +151,8 @@ fn effect(record: &Record) -> Option<Effect> {
                 about("spare", spare)
             }
             HostEvent::RetainFailed { .. } | HostEvent::RetainRegained => of("retain"),
+            HostEvent::RetainedRefused { file, .. } => about("retained-refused", file),
+            HostEvent::RetainedDropped { program, .. } => about("retained-dropped", program),
             HostEvent::LinkFailed { network, .. } | HostEvent::LinkReopened { network, .. } => {
                 about("link", network)
             }
@@ -180,7 +182,9 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::ConfigurationDisputed { .. } => of("configuration-disputed"),
         RemoteIo::StateLost { .. } => of("state-lost"),
         RemoteIo::StateRecovered { .. } => of("state-recovered"),
-        RemoteIo::ChoiceRefused { newest: Some(_), .. } => of("choice-refused"),
+        RemoteIo::ChoiceRefused { refusal: OrderRefusal::OtherState { .. }, .. } => {
+            of("choice-refused")
+        }
         RemoteIo::Protected { .. } | RemoteIo::Unprotected { .. } => of("protection"),
         RemoteIo::Released { .. } => of("released"),
         RemoteIo::Configured(_) => of("configured"),
@@ -319,7 +323,10 @@ mod tests {
             ),
             event("disputed", &format!(r#"{moment},"stations":3"#)),
             event("configuration-disputed", &format!(r#"{moment},"stations":1,"others":1"#)),
-            event("choice-refused", &format!("{moment},{newest}")),
+            event(
+                "choice-refused",
+                &format!(r#"{moment},"refusal":{{"reason":"other-state",{newest}}}"#),
+            ),
         ];
         let answers = [
             event("started-cold", r#""born":{"epoch":1,"cycle":2},"awaits_release":false"#),

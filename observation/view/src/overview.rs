@@ -280,7 +280,8 @@ fn group_overview(
         (_, true) => GroupState::Complete,
         (_, false) => GroupState::Reduced,
     };
-    let reason = (state == GroupState::Unprotected).then(|| no_spare(plant, group, spares));
+    let reason =
+        (state == GroupState::Unprotected).then(|| no_spare(plant, group, snapshot, spares));
     GroupOverview {
         name,
         state,
@@ -294,8 +295,16 @@ fn group_overview(
 }
 
 /// Why no spare protects a group now.
-fn no_spare(plant: &PlantFile, group: usize, spares: &[SpareOverview]) -> String {
+fn no_spare(
+    plant: &PlantFile,
+    group: usize,
+    snapshot: &Snapshot,
+    spares: &[SpareOverview],
+) -> String {
     let own = &plant.groups[group];
+    if snapshot.stations.iter().all(|station| station.state != StationState::Publishing) {
+        return "no station publishes, so there is no state that a spare could adopt".to_owned();
+    }
     if own.cluster.agreement().mode == Mode::Paper {
         return "no spare serves a group in the mode `paper`".to_owned();
     }
@@ -305,10 +314,16 @@ fn no_spare(plant: &PlantFile, group: usize, spares: &[SpareOverview]) -> String
             continue;
         };
         let name = &spare.name;
+        let mut stations = snapshot.stations.iter();
+        let slot = stations.find(|station| station.name == serves.name);
+        let is_unread = slot.is_some_and(|slot| slot.link.detached);
         reasons.push(match (known.state, &known.group) {
             _ if !serves.fits => format!("the group is too large for {name}"),
             (SpareState::NotReceived, _) => format!("{name} is not received"),
             (SpareState::Waking, Some(at)) if *at == own.name => format!("{name} is waking"),
+            (SpareState::Serving, Some(at)) if *at == own.name && is_unread => format!(
+                "{name} serves it, and its station is not received here: what it protects is not known"
+            ),
             (SpareState::Serving, Some(at)) if *at == own.name => {
                 format!("{name} serves it, which is not enough")
             }

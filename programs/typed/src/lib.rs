@@ -41,6 +41,7 @@ pub use self::machine::{Machine, Scratch};
 pub use self::naming::{Part, Parts};
 pub use self::operation::{
     Comparison, Operand, Operation, RealFunction, Signature, TextOperand, TextOperation,
+    text_literal,
 };
 pub use self::types::{
     Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,

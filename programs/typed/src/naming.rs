@@ -1,7 +1,7 @@
 //! Variables by name and by address: `pid.integral`, `table[3]`.
 
 use crate::form::{Program, Variable};
-use crate::operation::number_text;
+use crate::operation::{number_text, text_literal};
 use crate::types::{Array, Elementary, Type};
 
 /// A variable without parts, or such a part of one.
@@ -16,6 +16,22 @@ pub struct Part {
 }
 
 impl Part {
+    /// The value in a state as it is written in IEC 61131-3; nothing where it has parts, or where the state ends before it.
+    pub fn text(&self, state: &[u64]) -> Option<String> {
+        if let Some((of, stored)) = self.stored(state) {
+            return Some(of.text(stored));
+        }
+        let Type::Text(capacity) = self.of else {
+            return None;
+        };
+        let slots = state.get(usize::try_from(self.address / 64).ok()?..)?;
+        let (length, bytes) = slots.split_first()?;
+        let bytes = bytes.iter().flat_map(|slot| slot.to_le_bytes());
+        let length = usize::try_from(*length).unwrap_or(usize::MAX).min(usize::from(capacity));
+        let bytes: Vec<u8> = bytes.take(length).collect();
+        Some(text_literal(&bytes, false))
+    }
+
     /// The value in a state, as it is stored; nothing where it has parts, or where the state ends before it.
     pub fn stored(&self, state: &[u64]) -> Option<(Elementary, u64)> {
         let of = self.of.elementary()?;
@@ -99,6 +115,43 @@ impl Program {
                 }
                 _ => return Some(part),
             }
+        }
+    }
+
+    /// A variable or a part of it by its parts without parts, in the order of memory; references are left out, and so is what is behind `most` parts.
+    pub fn leaves(&self, part: Part, most: usize) -> Vec<Part> {
+        let mut leaves = Vec::new();
+        self.add_leaves(part, most, &mut leaves);
+        leaves
+    }
+
+    fn add_leaves(&self, part: Part, most: usize, leaves: &mut Vec<Part>) {
+        if leaves.len() >= most {
+            return;
+        }
+        match &part.of {
+            Type::Structure(id, _) => {
+                let found = self.structures.get(id.0 as usize);
+                let fields = found.iter().flat_map(|found| &found.fields);
+                for field in fields.filter(|field| !field.is_reference) {
+                    let name = format!("{}.{}", part.name, field.name);
+                    let address = part.address + 64 * u64::from(field.slot);
+                    self.add_leaves(Part { name, of: field.of.clone(), address }, most, leaves);
+                }
+            }
+            Type::Array(array) => {
+                let elements = (0..).map_while(|element| Some((element, indices(array, element)?)));
+                for (element, indices) in elements.take(most) {
+                    let name = format!("{}{indices}", part.name);
+                    let address = part.address + element * array.stride();
+                    self.add_leaves(
+                        Part { name, of: array.element.clone(), address },
+                        most,
+                        leaves,
+                    );
+                }
+            }
+            _ => leaves.push(part),
         }
     }
 

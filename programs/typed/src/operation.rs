@@ -10,7 +10,7 @@ mod signature;
 mod text;
 
 pub use self::signature::{Operand, Signature};
-pub use self::text::TextOperand;
+pub use self::text::{TextOperand, text_literal};
 
 use crate::types::Elementary;
 

@@ -163,6 +163,16 @@ pub enum OrderRefusal {
     /// The program continues, and no choice of a state is asked for.
     #[error("no choice of a state is asked for: the state of the program is not lost")]
     NoChoice,
+    /// A release where the state of the program is lost: the outputs wait for a choice.
+    #[error(
+        "the program waits for the choice of a state, and a release is none: accept the newest available state, or start the program cold"
+    )]
+    WaitsForChoice,
+    /// A choice of the newest state where no station has one.
+    #[error(
+        "no station has a state of the program: wait for one that has, or start the program cold"
+    )]
+    NoState,
     /// The chosen state is not available, or is not the newest.
     #[error("the newest available state is of cycle {} of the cluster", .newest.cycle.0)]
     OtherState {
@@ -203,17 +213,14 @@ fn stations_text(stations: StationSet) -> String {
 }
 
 impl OrderRefusal {
-    /// Why a choice is refused: the newest available state, where a choice is asked for, is of another cycle.
-    pub fn of_choice(newest: Option<Moment>) -> Self {
-        newest.map_or(Self::NoChoice, |newest| Self::OtherState { newest })
-    }
-
     /// Its code in the documentation of errors.
     pub fn code(self) -> &'static str {
         match self {
             Self::NoSignal | Self::Value { .. } | Self::Incomplete | Self::NotForced => "U0556",
             Self::NotAuthor => "U0556",
-            Self::NoChoice | Self::OtherState { .. } => "U0583",
+            Self::NoChoice | Self::WaitsForChoice | Self::NoState | Self::OtherState { .. } => {
+                "U0583"
+            }
             Self::AnotherChange
             | Self::OtherConfiguration { .. }
             | Self::NotPrepared

@@ -32,7 +32,7 @@ const MAXIMUM_RECORD_BYTES: usize = MAXIMUM_KEPT_TEXT_BYTES + 4096;
 const _: () = assert!(MAXIMUM_STATE_BITS / 64 * 9 + 4096 <= MAXIMUM_RECORD_BYTES);
 
 /// Version of the records.
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 
 type Layout = Configuration<LittleEndian, Varint, Limit<MAXIMUM_RECORD_BYTES>>;
 
@@ -89,7 +89,7 @@ pub struct RetainedStep {
     pub after: Lineage,
 }
 
-/// What a remote I/O notes of the newest sample whose outputs it applied.
+/// What a remote I/O notes of the newest sample whose outputs it applied, and of a history of which it has applied none yet.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Note {
     /// Its cluster.
@@ -102,16 +102,18 @@ pub struct Note {
     pub is_retentive: bool,
     /// Number of the note among those that this remote I/O has made.
     pub number: u64,
-    /// Lineage after the sample.
+    /// Lineage after the newest applied sample.
     pub lineage: Lineage,
-    /// The sample, as stations recall it.
+    /// Start of the history that it samples, while no output of that is applied: after a warm or a cold start.
+    pub begun: Option<Moment>,
+    /// The newest sample, as stations recall it.
     pub recalled: Recalled,
 }
 
 impl Note {
-    /// The cycle of the sample.
-    pub fn applied(&self) -> Moment {
-        self.recalled.sampled
+    /// The cycle of the newest applied sample; nothing where none was applied ever.
+    pub fn applied(&self) -> Option<Moment> {
+        self.recalled.applied
     }
 }
 

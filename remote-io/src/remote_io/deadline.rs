@@ -181,6 +181,8 @@ impl RemoteIo {
             self.knowledge.applied(moment);
             self.note_applied(moment);
             self.report_in_effect(moment);
+        } else {
+            self.note_not_applied(moment);
         }
         self.applied = Some(Applied { source, outputs: outputs.clone(), missing });
         let mut driven = self.forcing.outputs(&outputs);

@@ -217,14 +217,23 @@ impl RemoteIo {
                 }
             }
             (question, ..) => {
-                let newest = newest.filter(|_| question.is_some());
-                let newest = newest.map(|(_, newest)| newest.stepped);
-                self.report(Event::ChoiceRefused { moment, newest });
-                let refusal = OrderRefusal::of_choice(newest);
-                return self.obeyed(Err(refusal));
+                let refusal = match (question, newest) {
+                    (None, _) => OrderRefusal::NoChoice,
+                    (Some(_), None) => OrderRefusal::NoState,
+                    (Some(_), Some((_, newest))) => {
+                        OrderRefusal::OtherState { newest: newest.stepped }
+                    }
+                };
+                return self.refuse_choice(refusal);
             }
         }
         self.obeyed(Ok(()));
+    }
+
+    /// The question stays.
+    pub(super) fn refuse_choice(&mut self, refusal: OrderRefusal) {
+        self.report(Event::ChoiceRefused { moment: self.moment(), refusal });
+        self.obeyed(Err(refusal));
     }
 
     /// Starts to sample from the state of a station.
@@ -283,6 +292,7 @@ impl RemoteIo {
         let void = self.writing.lose(&self.settings.operator_inputs, moment, |_| true);
         self.report_void(&void);
         self.question = None;
+        self.note_begin(state.is_none().then_some(history.born()));
         let adopted =
             state.map(|(_, holding)| Floor { moment: holding.stepped, lineage: holding.lineage });
         self.knowledge.start(history, adopted);

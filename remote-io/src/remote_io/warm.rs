@@ -2,7 +2,8 @@
 //!
 //! ```text
 //!   no living station holds a state, and a retained one is
-//!     at or behind the newest applied sample ──── warm: the initial state with the retentive values
+//!     at or behind the newest applied sample, or of
+//!     a later start of which nothing was applied ─ warm: the initial state with the retentive values
 //!     before it, or it is not known ───────────── the state is lost: see `StaleState`
 //!   no station has retained one, though outputs
 //!     of the program were applied ─────────────── the state is lost
@@ -38,6 +39,10 @@ pub(super) struct Noting {
     is_damaged: bool,
     /// Of the newest sample, for the case that outputs of it are applied.
     next: Option<Note>,
+    /// The newest note, of this life or of an earlier one.
+    last: Option<Note>,
+    /// Start of the history that is sampled, while no output of that is applied.
+    begun: Option<Moment>,
 }
 
 impl Noting {
@@ -60,7 +65,9 @@ impl RemoteIo {
         });
         let fits = |note: &Note| note.recalled.inputs.width() == width;
         let found = found.filter(|note| !self.is_loaded(note.hash) || fits(note));
-        self.noting = Noting { is_on: true, number, found, is_damaged, next: None };
+        let last = found.clone();
+        self.noting =
+            Noting { is_on: true, number, found, is_damaged, next: None, last, begun: None };
         self
     }
 
@@ -76,7 +83,20 @@ impl RemoteIo {
     /// The newest applied output of the program before this one, of an earlier life.
     pub(super) fn applied_of_another(&self) -> Option<Moment> {
         let found = self.noting.found.as_ref().filter(|note| !self.is_loaded(note.hash));
-        found.map(Note::applied)
+        found.and_then(Note::applied)
+    }
+
+    /// Start of the history that was begun last, where no output of it was applied: no state of it is behind the plant. Of an earlier life, the
+    /// other one of two remote I/Os may have applied some.
+    fn begun(&self) -> Option<Moment> {
+        let is_alone = self.knowledge.floor().is_none() && self.pairing.is_none();
+        let found = self.noting.found.as_ref().filter(|_| is_alone);
+        self.noting.begun.or_else(|| found?.begun)
+    }
+
+    /// It samples a history that begins, or continues one from the state of a station.
+    pub(super) fn note_begin(&mut self, begun: Option<Moment>) {
+        self.noting.begun = begun;
     }
 
     /// The newest applied output of a program, and the lineage after its sample.
@@ -85,7 +105,10 @@ impl RemoteIo {
             Some(floor) if self.is_loaded(program) => Some((floor.moment, floor.lineage)),
             // Outputs of this program were applied since those of any other one.
             Some(_) => None,
-            None => self.noted_of(program).map(|note| (note.applied(), note.lineage)),
+            None => {
+                let note = self.noted_of(program)?;
+                Some((note.applied()?, note.lineage))
+            }
         }
     }
 
@@ -93,7 +116,7 @@ impl RemoteIo {
     pub(super) fn newest_applied(&self) -> Option<Moment> {
         let floor = self.knowledge.floor().map(|floor| floor.moment);
         let paired = self.pairing.as_ref().and_then(|pairing| pairing.applied());
-        floor.max(self.noted().map(Note::applied)).max(paired)
+        floor.max(self.noted().and_then(Note::applied)).max(paired)
     }
 
     /// The newest applied output whose state a cold start loses. A program that retains nothing loses nothing with the power of the whole plant.
@@ -124,6 +147,7 @@ impl RemoteIo {
             is_retentive: self.settings.restart.is_some(),
             number: self.noting.number,
             lineage: after,
+            begun: None,
             recalled: Recalled {
                 program: self.settings.program,
                 sampled: moment,
@@ -140,16 +164,58 @@ impl RemoteIo {
 
     /// Outputs of the sample of `moment` are applied.
     pub(super) fn note_applied(&mut self, moment: Moment) {
-        if let Some(note) = self.noting.next.take().filter(|note| note.applied() == moment) {
-            self.noting.number += 1;
-            self.member.put(Output::Retain(Retained::Note(note)));
+        self.noting.begun = None;
+        if let Some(note) = self.sampled_note(moment) {
+            self.keep_note(note);
         }
+    }
+
+    /// No output of the sample of `moment` is applied. That is noted while none of its history was: what stations keep of such a history is not
+    /// behind the plant, although they keep it after the newest applied output.
+    pub(super) fn note_not_applied(&mut self, moment: Moment) {
+        let Some(begun) = self.noting.begun else {
+            return;
+        };
+        let Some(sampled) = self.sampled_note(moment) else {
+            return;
+        };
+        let number = sampled.number;
+        let last = self.noting.last.as_ref();
+        let note = match last {
+            // Nothing was ever applied.
+            None => {
+                let recalled = Recalled { applied: None, ..sampled.recalled };
+                Note { begun: Some(begun), recalled, ..sampled }
+            }
+            Some(last)
+                if last.hash == sampled.hash && last.configuration == sampled.configuration =>
+            {
+                let excluded = last.recalled.excluded.or(sampled.recalled.excluded);
+                let applied = last.applied();
+                let recalled = Recalled { applied, excluded, ..sampled.recalled };
+                Note { number, begun: Some(begun), recalled, ..last.clone() }
+            }
+            // Inputs and numbers of stations are those of the program and the configuration before.
+            Some(last) => Note { number, begun: Some(begun), ..last.clone() },
+        };
+        self.keep_note(note);
+    }
+
+    /// The prepared note, where it is of this sample.
+    fn sampled_note(&mut self, moment: Moment) -> Option<Note> {
+        self.noting.next.take().filter(|note| note.recalled.sampled == moment)
+    }
+
+    fn keep_note(&mut self, note: Note) {
+        self.noting.number = note.number.saturating_add(1);
+        self.noting.last = Some(note.clone());
+        self.member.put(Output::Retain(Retained::Note(note)));
     }
 
     /// The newest retained state, but for those of stations that were excluded, with its station.
     pub(super) fn newest_retained(&self) -> Option<(StationId, &Kept)> {
         let applied = self.newest_applied().or_else(|| self.applied_of_another());
-        let epoch = applied.map(|applied| applied.epoch);
+        let epoch = self.begun().or(applied).map(|moment| moment.epoch);
         self.holders.newest_retained(self.noted_exclusions(), epoch)
     }
 
@@ -206,12 +272,16 @@ impl RemoteIo {
         let state = &kept.holding;
         // Without a note of its program, it is not known what was applied.
         let is_known = kept.is_whole && !self.has_unknown_exclusions();
-        let Some((applied, _)) = self.newest_applied_of(kept.of).filter(|_| is_known) else {
-            return true;
-        };
-        if self.holders.newest_recalled().is_some_and(|recalled| recalled > state.stepped) {
+        let recalled = self.holders.newest_recalled();
+        if !is_known || recalled.is_some_and(|recalled| recalled > state.stepped) {
             return true;
         }
+        if self.begun() == Some(state.born) {
+            return false;
+        }
+        let Some((applied, _)) = self.newest_applied_of(kept.of) else {
+            return true;
+        };
         let (newest, stepped) = (applied.cycle, state.stepped.cycle);
         applied.epoch != state.stepped.epoch
             || stepped < newest
@@ -227,6 +297,7 @@ impl RemoteIo {
         let stepped = kept.holding.stepped;
         let lost = applied.filter(|applied| applied.epoch == stepped.epoch);
         let lost = lost.map(|applied| applied.cycle.0.saturating_sub(stepped.cycle.0));
+        let lost = if self.begun() == Some(kept.holding.born) { Some(0) } else { lost };
         self.report(Event::StartedWarm {
             born: moment,
             from,

@@ -27,6 +27,7 @@ fn note(program: u64, cycle: u64, lineage: u64) -> Note {
         is_retentive: true,
         number: 5,
         lineage: Lineage(lineage),
+        begun: None,
         recalled: Recalled {
             program: PROGRAM,
             sampled: moment(cycle),
@@ -113,6 +114,36 @@ fn started(events: &[Event]) -> String {
     let first = words.iter().position(|word| word.starts_with("warm") || word == "cold");
     words.truncate(first.map_or(words.len(), |first| first + 1));
     words.join(", ")
+}
+
+/// After a warm start that no person has released, the power fails again: what stations have kept meanwhile is not behind the plant.
+#[test]
+fn what_is_kept_of_a_start_without_an_applied_output_is_used() {
+    let begin = Moment { epoch: Epoch(2), cycle: Cycle(5) };
+    let later = Moment { cycle: Cycle(40), ..begin };
+    let noted = |begun, applied| {
+        let of = note(NOW, 50, 33);
+        Some(Note { begun, recalled: Recalled { applied, ..of.recalled }, ..of })
+    };
+    let applied = Some(moment(50));
+    let of = |born, is_whole| {
+        let before = kept(NOW, 50, 99, is_whole);
+        Some(Kept { holding: Holding { born, stepped: later, ..before.holding }, ..before })
+    };
+    let other = Moment { cycle: Cycle(6), ..begin };
+    let older = Some(kept(NOW, 50, 33, true));
+    let cases = [
+        ("of that start", noted(Some(begin), applied), [of(begin, true); 2], "warm 0"),
+        ("of it and before it", noted(Some(begin), applied), [older, of(begin, true)], "warm 0"),
+        ("before it only", noted(Some(begin), applied), [older; 2], "warm 0"),
+        ("no output was ever applied", noted(Some(begin), None), [of(begin, true); 2], "warm 0"),
+        ("of another start", noted(Some(begin), applied), [of(other, true); 2], "asked"),
+        ("outputs of it were applied", noted(None, applied), [of(begin, true); 2], "asked"),
+        ("values are dropped", noted(Some(begin), applied), [of(begin, false); 2], "asked"),
+    ];
+    for (name, found, kept, wanted) in cases {
+        assert_eq!(started(&run(found, false, kept, None)), wanted, "{name}");
+    }
 }
 
 #[test]

@@ -144,8 +144,8 @@ impl RetainedFiles {
             let is_own = |note: &Note| owner.is_none_or(|owner| note.cluster == owner.cluster);
             let foreign = newest.as_ref().is_some_and(|note| !is_own(note));
             let newest = newest.filter(|_| !foreign);
-            let applied = newest.as_ref().map(Note::applied);
-            (newest.into_iter().collect(), applied, foreign)
+            let sampled = newest.as_ref().map(|note| note.recalled.sampled);
+            (newest.into_iter().collect(), sampled, foreign)
         };
         let (notes, mut files) = self.read(owner, of_file);
         let is_there = |path: &PathBuf| files.iter().any(|file| file.path == *path);
@@ -335,6 +335,10 @@ struct Turn {
     /// Whether the text of the program is kept.
     has_program: bool,
     notes: u32,
+    /// Bytes of the current file.
+    written: u64,
+    /// Bytes of the longest file that could not be continued, while the disk takes no more than that.
+    fails_at: Option<u64>,
 }
 
 impl Turn {
@@ -363,7 +367,23 @@ impl Turn {
             is_synced: Arc::default(),
             has_program: false,
             notes: 0,
+            written: 0,
+            fails_at: None,
         }
+    }
+
+    /// The disk refuses a record: behind a torn one, or a gap in the steps, nothing would be read.
+    fn fails(&mut self) {
+        self.fails_at = Some(self.fails_at.unwrap_or(0).max(self.written));
+        self.current = None;
+        self.written = 0;
+    }
+
+    /// A record of so many bytes is written. A full disk takes as much again as the file had that was truncated, so a failure is over with a longer
+    /// file, or with a whole one.
+    fn succeeds(&mut self, bytes: usize, is_complete: bool) {
+        self.written = self.written.saturating_add(bytes as u64);
+        self.fails_at = self.fails_at.filter(|at| self.written <= *at && !is_complete);
     }
 
     /// Begins the other file with a record; the one before stays as it is where that fails.
@@ -444,7 +464,10 @@ impl Writer {
             let mut reason = self.failure.reason();
             match written {
                 // A step behind a gap is not read: only a whole record behind it shows that the disk takes states again.
-                Ok(true) if left_out == self.failure.left_out.load(Ordering::Acquire) => {
+                Ok(true)
+                    if left_out == self.failure.left_out.load(Ordering::Acquire)
+                        && self.turns.iter().all(|turn| turn.fails_at.is_none()) =>
+                {
                     *reason = None;
                 }
                 Ok(_) => {}
@@ -455,7 +478,7 @@ impl Writer {
         }
     }
 
-    /// Whether the record is whole: a state, or a note that begins a file.
+    /// Whether the record shows that the disk takes states: a state, a note that begins a file, or the one with which a failure ends.
     fn write(&mut self, record: &Retained, bytes: &[u8]) -> Result<bool, (PathBuf, io::Error)> {
         let of = match record {
             Retained::State(state) => Some(state.program),
@@ -474,11 +497,18 @@ impl Writer {
             }
         };
         let may_begin = turn.current.is_none() || turn.is_synced.load(Ordering::Acquire);
-        let written = if is_whole && may_begin {
-            turn.begin(bytes).map(Some)
-        } else {
-            turn.append(bytes).map(|()| None)
-        };
+        let (failed, is_open) = (turn.fails_at, turn.current.is_some());
+        let begins = is_whole && may_begin;
+        if begins {
+            turn.written = 0;
+        }
+        let written =
+            if begins { turn.begin(bytes).map(Some) } else { turn.append(bytes).map(|()| None) };
+        if written.is_ok() {
+            // A step without a file is not written.
+            let length = if turn.current.is_some() { bytes.len() } else { 0 };
+            turn.succeeds(length, begins && is_open);
+        }
         match written {
             Ok(None) => {}
             // Where the disk is slow, the next record waits here, and the cycle does not.
@@ -487,12 +517,11 @@ impl Writer {
                 if of.is_none() {
                     turn.remove_both();
                 }
-                // Behind a torn record, or a gap in the steps, nothing would be read.
-                turn.current = None;
+                turn.fails();
                 return Err((turn.files.folder.clone(), error));
             }
         }
-        Ok(is_whole)
+        Ok(is_whole || failed.is_some() && turn.fails_at.is_none())
     }
 }
 

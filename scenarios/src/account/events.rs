@@ -126,13 +126,13 @@ impl Account {
     fn order_decided(&mut self, program: ProgramId, event: &RemoteIoEvent) {
         let next = self.next_cycle();
         match event {
-            RemoteIoEvent::ChoiceRefused { newest, .. } => {
+            RemoteIoEvent::ChoiceRefused { refusal, .. } => {
                 let asked = self.steps.iter_mut().rev().find(|step| {
                     step.member.sampled_program() == Some(program)
-                        && matches!(step.action, Action::Choose { .. })
+                        && matches!(step.action, Action::Choose { .. } | Action::Release)
                 });
                 if let Some(step) = asked {
-                    step.refused = Some(OrderRefusal::of_choice(*newest));
+                    step.refused = Some(*refusal);
                 }
             }
             RemoteIoEvent::Forced { force, .. } => self.forced(program, force, next, None),

@@ -19,7 +19,12 @@ struct Pending {
     commanded: Commanded,
     /// Name of the remote I/O.
     name: String,
+    /// Its deadlines since the order was sent.
+    deadlines: u8,
 }
+
+/// A release that has nothing to release has no record: it was taken when so many deadlines are over.
+const RELEASED_AFTER: u8 = 5;
 
 impl PendingOrders {
     /// Waits for the outcome of an order to the remote I/O `name`.
@@ -28,7 +33,7 @@ impl PendingOrders {
         self.0.retain(|Pending { commanded, .. }| {
             !commanded.answer.is_closed() || !commanded.is_write()
         });
-        self.0.push(Pending { commanded, name });
+        self.0.push(Pending { commanded, name, deadlines: 0 });
     }
 
     /// The orders that are decided by a record, with their outcomes. Of equal orders the oldest is meant: a remote I/O takes them in their order,
@@ -39,13 +44,18 @@ impl PendingOrders {
             return decided;
         }
         let mut is_taken = false;
-        for pending in std::mem::take(&mut self.0) {
+        for mut pending in std::mem::take(&mut self.0) {
+            let is_deadline = is_deadline(record, &pending.commanded.action);
+            pending.deadlines = pending.deadlines.saturating_add(u8::from(is_deadline));
             let outcome = match &pending.commanded.action {
                 OperatorAction::Command { member, command, .. } => {
                     if ends_life(record, *member) && !pending.commanded.is_write() {
                         Some(Err(Refusal::Down(pending.name.clone())))
                     } else {
-                        outcome(*member, command, record, is_taken)
+                        let is_over = pending.deadlines >= RELEASED_AFTER;
+                        let is_released = matches!(command, Command::Release) && is_over;
+                        let outcome = outcome(*member, command, record, is_taken);
+                        outcome.or(is_released.then(|| Ok(Done::default())))
                     }
                 }
                 _ => None,
@@ -97,6 +107,15 @@ impl DecidedOrder {
     pub fn answer(self) {
         self.commanded.answer(self.done);
     }
+}
+
+/// Whether a record is of a deadline of the remote I/O of an order.
+fn is_deadline(record: &Record, order: &OperatorAction) -> bool {
+    let is_applied = matches!(record.event, Happening::RemoteIo(RemoteIoEvent::Applied { .. }));
+    let OperatorAction::Command { member, .. } = order else {
+        return false;
+    };
+    is_applied && record.member == Some(*member)
 }
 
 /// Whether the process of a member has ended by a record: it was killed, or ended by itself, or another one has its place.
@@ -163,9 +182,11 @@ fn outcome(
             Command::Choose { choice: StateChoice::Newest { .. } },
             RemoteIoEvent::StartedWarm { .. } | RemoteIoEvent::AdoptedLineage { .. },
         ) => Some(Ok(Done::default())),
-        (Command::Choose { .. }, RemoteIoEvent::ChoiceRefused { newest, .. }) => {
-            refused(OrderRefusal::of_choice(*newest))
-        }
+        (
+            Command::Choose { .. } | Command::Release,
+            RemoteIoEvent::ChoiceRefused { refusal, .. },
+        ) => refused(*refusal),
+        (Command::Release, RemoteIoEvent::Released { .. }) => Some(Ok(Done::default())),
         _ => None,
     }
 }
@@ -225,7 +246,7 @@ mod tests {
             (
                 choose(StateChoice::Cold),
                 RemoteIoEvent::StartedCold { born: moment, awaits_release: false, lost: None },
-                RemoteIoEvent::ChoiceRefused { moment, newest: None },
+                RemoteIoEvent::ChoiceRefused { moment, refusal: OrderRefusal::NoChoice },
             ),
             (
                 Command::Force(force.clone()),

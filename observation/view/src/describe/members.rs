@@ -90,12 +90,7 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         state_lost_text(*applied, newest.zip(*holder).map(|(newest, holder)| (newest, name(holder, members))), *asks);
     StateRecovered { from, .. } => "state-recovered" Notice
         format!("{} has returned with the state of its program", name(*from, members));
-    ChoiceRefused { newest: Some(newest), .. } => "choice-refused" Warning format!(
-        "refuses the operator's choice: the newest available state is from cycle {}",
-        newest.cycle.0
-    );
-    ChoiceRefused { newest: None, .. } => "choice-refused" Warning
-        "refuses the operator's choice: the state of its program is not lost";
+    ChoiceRefused { refusal, .. } => "choice-refused" Warning format!("refuses the operator's choice: {refusal}");
     Protected { .. } => "protected" Notice
         "its program is protected: the failure of one station would be masked";
     Unprotected { lacking, .. } => "unprotected" Alarm {
@@ -231,7 +226,12 @@ fn started_warm_text(
 fn state_lost_text(applied: Option<Moment>, newest: Option<(Moment, &str)>, asks: bool) -> String {
     let behind = applied.map_or_else(
         || "it is not known whether newer outputs were applied".to_owned(),
-        |applied| format!("outputs of cycle {} were applied", applied.cycle.0),
+        |applied| {
+            let is_other = newest.is_some_and(|(newest, _)| newest.epoch != applied.epoch);
+            // Cycles of two starts are no age.
+            let start = if is_other { ", counted from another start of the cluster," } else { "" };
+            format!("outputs of cycle {}{start} were applied", applied.cycle.0)
+        },
     );
     let next = match (asks, newest) {
         (true, Some(_)) => {
@@ -247,7 +247,7 @@ fn state_lost_text(applied: Option<Moment>, newest: Option<(Moment, &str)>, asks
             "the newest available state, of {holder}, is from cycle {} of the cluster, and",
             newest.cycle.0
         ),
-        None => "no station has one, and".to_owned(),
+        None => "no station has one that can be used, and".to_owned(),
     };
     format!("the state of its program is lost: {available} {behind}; {next}")
 }

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use understudy_journal::Record;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
-use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet};
+use understudy_wire::{Member, OrderRefusal, ProgramId, ProgramSet, StationId, StationSet};
 
 use super::Model;
 use super::pairs::PARTNER_LOST;
@@ -105,7 +105,9 @@ impl Model {
                 self.lost_is(program, cycle, Some(lost));
             }
             // A newer state has become available since.
-            RemoteIoEvent::ChoiceRefused { newest: Some(newest), .. } => {
+            RemoteIoEvent::ChoiceRefused {
+                refusal: OrderRefusal::OtherState { newest }, ..
+            } => {
                 let standing = self.changes.now().program(program);
                 if let Some(mut lost) = standing.and_then(|own| own.lost.clone()) {
                     let newer = lost.newest.map(|known| newest.cycle.0.saturating_sub(known));

@@ -13,7 +13,7 @@ use crate::run::{Run, find_running};
 /// The overview shows the present; the past is for the view of a group.
 const BOUNDS: Bounds = Bounds { cycles: 64, events: 1000, changes: 64, timings: 16 };
 
-/// A group whose journal has not grown for this time is not observed.
+/// A group of which no new cycle is known for this time is not observed.
 const STALE: Duration = Duration::from_secs(3);
 
 /// Time between two searches for the run of a group.
@@ -32,6 +32,27 @@ struct FollowedGroup {
     run: Run,
     model: Model,
     following: Following,
+    advance: Advance,
+}
+
+/// Whether the newest cycle of a group is the present. Records alone do not tell: the first ones after an outage are of members that start, and
+/// the newest cycle is still that of before.
+#[derive(Debug, Default)]
+struct Advance {
+    newest: Option<i64>,
+    /// When the newest cycle was another one at the last look.
+    at: Option<Instant>,
+}
+
+impl Advance {
+    /// Takes the newest cycle at `now`; how long ago it changed. What is found first may be as old as the journal.
+    fn look(&mut self, newest: Option<i64>, age: Duration, now: Instant) -> Duration {
+        if self.at.is_none() || newest != self.newest {
+            self.at = Some(now.checked_sub(age).filter(|_| self.at.is_none()).unwrap_or(now));
+            self.newest = newest;
+        }
+        self.at.map_or(age, |at| now.saturating_duration_since(at))
+    }
 }
 
 impl FollowedPlant {
@@ -56,7 +77,7 @@ impl FollowedPlant {
     pub fn follow(&mut self, group: usize, run: Run) {
         let (model, following) = Following::of(&run, BOUNDS);
         if let Some(place) = self.groups.get_mut(group) {
-            *place = Some(FollowedGroup { run, model, following });
+            *place = Some(FollowedGroup { run, model, following, advance: Advance::default() });
         }
     }
 
@@ -90,7 +111,7 @@ impl FollowedPlant {
 
 impl FollowedGroup {
     fn view(&mut self, now: Instant) -> GroupView {
-        let Self { run, model, following } = self;
+        let Self { run, model, following, advance } = self;
         while following.poll(&mut |found| model.take_found(found)) > 0 {
             // A journal that grows faster than it is read is not followed to its end.
             if following.progress().is_at_end() {
@@ -104,17 +125,51 @@ impl FollowedGroup {
         if let Err(reading) = progress.current(now) {
             return GroupView::Unknown(reading.to_string());
         }
-        match progress.age(now) {
-            Some(age) if age <= STALE => {}
-            Some(age) => {
-                let seconds = age.as_secs();
-                return GroupView::Unknown(format!("no record for {seconds} s"));
-            }
-            None => return GroupView::Unknown("no record yet".to_owned()),
+        let Some(age) = progress.age(now) else {
+            return GroupView::Unknown("no record yet".to_owned());
+        };
+        let newest = model.newest();
+        let since = advance.look(newest, age, now);
+        let lacks = |what: &str, since: Duration| {
+            GroupView::Unknown(format!("no {what} for {} s", since.as_secs()))
+        };
+        if age > STALE {
+            return lacks("record", age);
         }
-        if model.cycle().is_none() {
+        let Some(newest) = newest else {
             return GroupView::Unknown("no deadline was reported yet".to_owned());
+        };
+        if since > STALE {
+            return lacks("cycle", since);
+        }
+        if model.program_ids().all(|program| model.deadline(program, newest).is_none()) {
+            return GroupView::Unknown("no remote I/O reports its deadlines".to_owned());
         }
         GroupView::Present(Box::new(model.snapshot()))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "any time to begin with")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_of_members_that_start_make_an_old_cycle_no_younger() {
+        let start = Instant::now();
+        let mut advance = Advance::default();
+        let mut since = |newest, age, after| {
+            let [age, now] = [age, after].map(Duration::from_millis);
+            advance.look(newest, age, start + now).as_millis()
+        };
+        assert_eq!(since(Some(100), 40, 100), 40, "as old as the journal");
+        assert_eq!(since(Some(200), 10, 1_000), 0);
+        assert_eq!(since(Some(200), 3_000, 4_000), 3_000);
+        // The first record after an outage: the newest cycle is that of before.
+        assert_eq!(since(Some(200), 0, 4_010), 3_010);
+        assert_eq!(since(Some(950), 0, 4_300), 0);
+        let mut late = Advance::default();
+        let now = start + Duration::from_secs(9);
+        assert_eq!(late.look(Some(1), Duration::from_secs(5), now), Duration::from_secs(5));
     }
 }

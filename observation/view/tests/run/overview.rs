@@ -129,6 +129,31 @@ fn the_overview_says_which_group_is_unprotected_and_where_the_spare_is() {
             "line-1 is UNPROTECTED (failed: robot, understudy): spare-1 serves it, which is not enough",
         ],
     );
+    // This viewer has no keys for the station of the spare.
+    let GroupView::Present(mut unread) = group("line-1", &["robot"], Publishing, Some("line-1"))
+    else {
+        unreachable!("it is present")
+    };
+    unread.margin.survives = 0;
+    unread
+        .stations
+        .iter_mut()
+        .filter(|it| it.name == "spare")
+        .for_each(|it| it.link.detached = true);
+    check(
+        [GroupView::Present(unread), calm("line-2")],
+        (SpareState::Serving, Some("line-1")),
+        &[
+            "line-1 is UNPROTECTED (failed: robot): spare-1 serves it, and its station is not received here: what it protects is not known",
+        ],
+    );
+    check(
+        [group("line-1", &["robot", "press", "understudy"], Standby, Some("")), calm("line-2")],
+        (SpareState::Asleep, None),
+        &[
+            "line-1 is UNPROTECTED (failed: robot, press, understudy): no station publishes, so there is no state that a spare could adopt",
+        ],
+    );
 }
 
 /// What is not known is not well: neither a group without a present state nor a spare that nothing receives.

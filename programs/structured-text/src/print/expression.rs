@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use understudy_typed::{Comparison, Elementary};
+use understudy_typed::{Comparison, Elementary, text_literal};
 
 use crate::lexer::calendar;
 use crate::syntax::{
@@ -117,7 +117,7 @@ pub(super) fn literal(of: &Literal) -> String {
         }
         Literal::Real { text, of } => typed(of, text.clone()),
         Literal::Time { nanoseconds, of } => time(*nanoseconds, *of),
-        Literal::Text { bytes, wide } => text(bytes, *wide),
+        Literal::Text { bytes, wide } => text_literal(bytes, *wide),
     }
 }
 
@@ -169,34 +169,6 @@ fn duration(nanoseconds: i64) -> String {
             rest %= length;
         }
     }
-    text
-}
-
-fn text(bytes: &[u8], wide: bool) -> String {
-    let quote = if wide { '"' } else { '\'' };
-    let mut text = String::from(quote);
-    for byte in bytes {
-        let character = char::from(*byte);
-        match byte {
-            b'$' => text.push_str("$$"),
-            0x0A => text.push_str("$L"),
-            0x0C => text.push_str("$P"),
-            0x0D => text.push_str("$R"),
-            0x09 => text.push_str("$T"),
-            _ if character == quote => {
-                text.push('$');
-                text.push(quote);
-            }
-            0x20..=0x7E => text.push(character),
-            _ if wide => {
-                let _ = write!(text, "${byte:04X}");
-            }
-            _ => {
-                let _ = write!(text, "${byte:02X}");
-            }
-        }
-    }
-    text.push(quote);
     text
 }
 

@@ -1,5 +1,7 @@
 //! What each operation on texts gives. A text is a row of bytes.
 
+use std::fmt::Write as _;
+
 use crate::operation::{TextOperation, number_text};
 use crate::types::Elementary;
 
@@ -123,4 +125,33 @@ fn find(text: &[u8], sought: &[u8]) -> u64 {
     }
     let at = text.windows(sought.len()).position(|window| window == sought);
     at.map_or(0, |at| at as u64 + 1)
+}
+
+/// A text as a literal of IEC 61131-3: `'it$'s'`, or in double quotes where it is a WSTRING.
+pub fn text_literal(bytes: &[u8], wide: bool) -> String {
+    let quote = if wide { '"' } else { '\'' };
+    let mut text = String::from(quote);
+    for byte in bytes {
+        let character = char::from(*byte);
+        match byte {
+            b'$' => text.push_str("$$"),
+            0x0A => text.push_str("$L"),
+            0x0C => text.push_str("$P"),
+            0x0D => text.push_str("$R"),
+            0x09 => text.push_str("$T"),
+            _ if character == quote => {
+                text.push('$');
+                text.push(quote);
+            }
+            0x20..=0x7E => text.push(character),
+            _ if wide => {
+                let _ = write!(text, "${byte:04X}");
+            }
+            _ => {
+                let _ = write!(text, "${byte:02X}");
+            }
+        }
+    }
+    text.push(quote);
+    text
 }

@@ -63,16 +63,15 @@ impl<M: Machine> Host<'_, M> {
             };
             self.sink.record(now, Noted::Host(event));
         }
-        if now.since(round.reported) < period {
-            return;
-        }
         if let Some(change) = self.retainer.as_mut().and_then(Retainer::take_change) {
-            round.reported = now;
             let event = match change {
                 Some(reason) => HostEvent::RetainFailed { reason },
                 None => HostEvent::RetainRegained,
             };
             self.sink.record(now, Noted::Host(event));
+        }
+        if now.since(round.reported) < period {
+            return;
         }
         let writes = self.orders.take_refused_writes();
         if writes > 0 {

@@ -59,6 +59,7 @@ fn note(cycle: u64) -> Retained {
         is_retentive: true,
         number: cycle,
         lineage: lineage(cycle),
+        begun: None,
         recalled: Recalled {
             program: PROGRAM,
             sampled: moment(cycle),
@@ -104,7 +105,7 @@ fn the_newest_cycle_comes_back_over_several_lives() {
 }
 
 fn newest_of(files: &RetainedFiles) -> Option<Moment> {
-    files.notes(Some(OWNER)).newest.map(|note| note.applied())
+    files.notes(Some(OWNER)).newest.and_then(|note| note.applied())
 }
 
 /// A note that may not be the newest proves nothing: a file that is damaged, cut or emptied leaves none.
@@ -205,7 +206,7 @@ fn what_was_kept_with_other_keys_is_told_apart() {
         retainer.finish();
         for authority in keys {
             let found = named(authority).notes(Some(Owner { authority, ..OWNER }));
-            let newest = found.newest.map(|note| note.applied());
+            let newest = found.newest.and_then(|note| note.applied());
             let is_own = authority == kept_with;
             assert_eq!(newest, is_own.then(|| moment(life)));
             assert_eq!(found.is_damaged, !is_own);
@@ -217,7 +218,12 @@ fn what_was_kept_with_other_keys_is_told_apart() {
         retainer.finish();
         let owner = Owner { authority: Some(AuthorityHash(7)), ..OWNER };
         let found = next.notes(Some(owner));
-        assert_eq!(found.newest.map(|note| note.applied()), Some(moment(0)), "{:?}", found.files);
+        assert_eq!(
+            found.newest.and_then(|note| note.applied()),
+            Some(moment(0)),
+            "{:?}",
+            found.files
+        );
     }
 }
 
@@ -249,18 +255,17 @@ fn the_newest_note_comes_back() {
                 Retained::Note(mut of) => {
                     of.number = cycle;
                     of.recalled.sampled = moment(cycle);
+                    of.recalled.applied = Some(moment(cycle));
                     of
                 }
                 _ => unreachable!("a note"),
             }));
         }
-        while newest_of(&files) != Some(moment(cycle)) {
-            std::thread::yield_now();
-        }
+        wait_until(|| newest_of(&files) == Some(moment(cycle)));
     }
     retainer.finish();
     let found = files.notes(Some(OWNER));
-    assert_eq!(found.newest.map(|note| note.applied()), Some(moment(cycle)));
+    assert_eq!(found.newest.and_then(|note| note.applied()), Some(moment(cycle)));
     assert!(!found.is_damaged, "{:?}", found.files);
     let foreign = files.notes(Some(Owner { cluster: ClusterHash(9), ..OWNER }));
     assert!(foreign.newest.is_none() && foreign.is_damaged, "{:?}", foreign.files);
@@ -441,6 +446,34 @@ fn a_full_disk_is_reported_until_it_has_room() {
     assert_eq!(changed(&mut retainer, 3), None);
     retainer.finish();
     assert_eq!(newest(&files), Some(3));
+}
+
+/// A full disk takes as much again as the file had that is begun anew: an alarm that ends and begins with each file would tell nobody anything.
+#[test]
+fn a_failure_is_over_with_a_longer_file_or_a_whole_one() {
+    let folder = Folder::new("retained-turn");
+    let mut turn = Turn::new(Some(PROGRAM), RetainedFiles::new(&folder, "robot.robot".to_owned()));
+    let file = |turn: &mut Turn, steps: usize| {
+        turn.written = 0;
+        turn.succeeds(100, false);
+        (0..steps).for_each(|_| turn.succeeds(10, false));
+    };
+    file(&mut turn, 5);
+    turn.fails();
+    for _ in 0..3 {
+        file(&mut turn, 5);
+        assert_eq!(turn.fails_at, Some(150));
+        turn.fails();
+        // Nothing of the next file.
+        turn.fails();
+    }
+    file(&mut turn, 6);
+    assert_eq!(turn.fails_at, None, "it is longer");
+    turn.fails();
+    file(&mut turn, 2);
+    assert_eq!(turn.fails_at, Some(160));
+    turn.succeeds(100, true);
+    assert_eq!(turn.fails_at, None, "the file before is whole");
 }
 
 /// A disk that takes nothing for a while: the cycle goes on, what has no room is left out, and that is reported. The steps behind the gap are not used.
