@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use understudy_bits::{Exact, Inexact, Layout, exact};
 use understudy_executable::{Executable, Interface};
-use understudy_ladder::{LowerError, Program as LadderProgram, circuit};
+use understudy_ladder::{Executed, LowerError, Program as LadderProgram};
 use understudy_logic::Circuit;
 use understudy_typed::{
     CarriedPath, CarriedState, EdgeMemory, Fate, Program as TypedProgram, Successor, Told,
@@ -48,8 +48,10 @@ pub enum Unnamed {
 #[derive(Debug, Clone)]
 struct Rungs {
     ladder: LadderProgram,
+    /// What stations execute but for the signals that it keeps and does not read.
     circuit: Circuit,
-    /// The circuit as stations execute it.
+    /// The circuit with all signals in its state, as stations execute it.
+    kept: Circuit,
     executable: Executable,
     /// What its registers are in the state of the program.
     layout: Layout,
@@ -67,11 +69,12 @@ impl Code {
         ladder: LadderProgram,
         source: Arc<SourceText>,
     ) -> Result<Self, LowerError> {
-        let Exact { circuit, layout } = circuit(&typed)?;
+        let Executed { circuit, kept } = Executed::new(&typed, &ladder)?;
         let circuit = circuit.named(ladder.name.as_str());
+        let Exact { circuit: kept, layout, .. } = kept;
         let retentive = layout.retentive_mask(&typed);
-        let executable = Executable::from(&circuit).keeping(retentive.clone());
-        let rungs = Rungs { ladder, circuit, executable, layout, retentive };
+        let executable = Executable::from(&kept).keeping(retentive.clone());
+        let rungs = Rungs { ladder, circuit, kept, executable, layout, retentive };
         Ok(Self { typed, source, body: Body::Rungs(Box::new(rungs)) })
     }
 
@@ -98,7 +101,7 @@ impl Code {
         }
     }
 
-    /// The circuit that stations execute, of one that is written in rungs.
+    /// The circuit of one that is written in rungs: its registers are the first ones of a state, behind which stand signals that no scan reads.
     pub fn circuit(&self) -> Option<&Circuit> {
         match &self.body {
             Body::Rungs(rungs) => Some(&rungs.circuit),
@@ -297,7 +300,7 @@ impl Code {
     /// The canonical text that its hash is of: equal texts mean equal behaviour, and equal states.
     pub(crate) fn text(&self) -> String {
         match &self.body {
-            Body::Rungs(rungs) => circuit_text(&rungs.circuit, &rungs.retentive),
+            Body::Rungs(rungs) => circuit_text(&rungs.kept, &rungs.retentive),
             Body::Text => typed_text(&self.typed),
         }
     }
