@@ -228,20 +228,31 @@ impl Code {
         let fields = self.typed.structures.iter().flat_map(|of| &of.fields);
         let fields = fields.map(|field| field.name.as_str());
         let variables = self.typed.variables.iter().map(|variable| variable.name.as_str());
-        let mut names = variables.chain(fields);
-        if let Some(edges) = names.clone().find_map(|name| self.several_edges(name)) {
+        let mut names = variables.clone().chain(fields.clone());
+        if let Some(edges) = names.find_map(|name| self.several_edges(name)) {
             return Some(Unnamed::SeveralEdges(edges.to_owned()));
         }
+        // Of several programs, each name of theirs stands behind the instance; of one that is counted, another change may count others.
+        let is_plain = |name: &str| !name.contains('#');
         // Parts of a chart have names that stay where other parts change.
-        let stays = |name: &str| {
+        let is_of_chart = |name: &str| {
             let parts = ["begun.", "timer.", "stored.", "fires."];
-            !name.contains('.')
-                || parts.iter().any(|part| name.starts_with(part))
-                || EdgeMemory::named(name).is_some()
+            parts.iter().any(|part| name.starts_with(part))
         };
+        let stays = |name: &str| {
+            !name.contains('.') || is_of_chart(name) || EdgeMemory::named(name).is_some()
+        };
+        let is_hidden_of_chart = |name: &str| {
+            let own = name.split_once('.').map_or(name, |(_, own)| own);
+            is_of_chart(name) || is_of_chart(own)
+        };
+        let mut hidden = self.typed.hidden.iter().map(|variable| variable.name.as_str());
         // Of rungs, all other memory is that of their signals and blocks.
-        let is_named =
-            self.ladder().is_some() || names.all(stays) && self.typed.has_names_for_all();
+        let is_named = self.ladder().is_some()
+            || variables.into_iter().all(is_plain)
+                && fields.into_iter().all(stays)
+                && hidden.all(is_hidden_of_chart)
+                && self.typed.has_names_for_all();
         (!is_named).then_some(Unnamed::Memory)
     }
 

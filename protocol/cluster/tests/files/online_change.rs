@@ -297,3 +297,40 @@ fn a_seal_in_that_is_added_holds_what_runs() {
         outputs(&text("start /stop"), &text("[ start | motor ] /stop"), 2, &[1, 1, 0, 0, 2, 0]);
     assert_eq!(found, [1, 1, 1, 1, 0, 0]);
 }
+
+/// A chart that is the body of a PROGRAM goes on in its active step, in a program that is alone and in one of several.
+#[test]
+fn a_chart_goes_on_in_its_active_step() {
+    let text = |more: &str, ends: &str| {
+        format!(
+            "PROGRAM one\nVAR_INPUT a, b : BOOL; END_VAR\nVAR_OUTPUT y : BOOL; END_VAR\n\
+             INITIAL_STEP idle: END_STEP\nSTEP work: y(N); END_STEP\n\
+             TRANSITION FROM idle TO work := a; END_TRANSITION\n\
+             TRANSITION FROM work TO idle := {ends}; END_TRANSITION\nEND_PROGRAM\n{more}"
+        )
+    };
+    let several = "PROGRAM two\nVAR_INPUT c : BOOL; END_VAR\nVAR_OUTPUT z : BOOL; END_VAR\nz := c;\nEND_PROGRAM\n\
+                   CONFIGURATION c RESOURCE r ON PLC TASK t(INTERVAL := T#100ms, PRIORITY := 1);\n\
+                   PROGRAM i1 WITH t : one; PROGRAM i2 WITH t : two; END_RESOURCE END_CONFIGURATION\n";
+    for more in ["", several] {
+        let change = change("one.st", &text(more, "b"), &text(more, "b AND NOT a"));
+        let change = change.unwrap_or_else(|reasons| panic!("{reasons:?}"));
+        let change = &change.programs[0];
+        let mut running = Running::new(&change.before.executable);
+        let [a, both, b] = [1, 3, 2];
+        // It begins in the first scan, works, and is changed and changed back while it works.
+        running.step(&[0]);
+        running.step(&[a]);
+        assert_eq!(running.step(&[0])[0] & 1, 1, "it works");
+        let state = change.forward.convert(&running.state);
+        let mut running = Running { executable: &change.after.executable, state };
+        for inputs in [0, both, both] {
+            assert_eq!(running.step(&[inputs])[0] & 1, 1, "it goes on, and ends in another way");
+        }
+        let state = change.back.convert(&running.state);
+        let mut running = Running { executable: &change.before.executable, state };
+        assert_eq!(running.step(&[0])[0] & 1, 1, "it goes on");
+        running.step(&[b]);
+        assert_eq!(running.step(&[0])[0] & 1, 0, "it is over as before");
+    }
+}
