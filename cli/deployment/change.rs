@@ -176,6 +176,9 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
             of_pair.0.clear();
             pause();
         }
+        let configuration = if is_forward { texts.after } else { texts.before };
+        members.find_done(texts, configuration, &mut of_pair);
+        of_pair.keep_done();
         asked.0.append(&mut of_pair.0);
     }
     asked

@@ -245,7 +245,7 @@ impl Found<'_> {
             self.cut_short.push(shown.clone());
         }
         if let Some(Source::Program(program)) = &source {
-            let retained = Retained::of(program, is_ladder);
+            let retained = Retained::of(program, ladder.filter(|_| is_ladder));
             self.retained.extend(retained.map(|retained| (shown.clone(), retained)));
         }
         match &source {
@@ -296,7 +296,7 @@ impl Found<'_> {
             };
             let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
             seen.push(report.name.clone());
-            let retained = Retained::of(controller.code.typed(), controller.ladder().is_some())
+            let retained = Retained::of(controller.code.typed(), controller.ladder())
                 .map(|retained| retained.writing(cluster.retained_bytes_a_day(program)));
             self.retained.extend(retained.map(|retained| (report.name.clone(), retained)));
             if controller.ladder().is_none() {

@@ -7,32 +7,48 @@
 //! ```
 //!
 //! Samples arrive, are replayed and become void program by program, and a state is transferred program by program. So
-//! the replicas hold x(N+1) from cycle to cycle, and the generated circuit is evaluated on it in each turn.
+//! the replicas hold x(N+1) from cycle to cycle, and the generated circuit is evaluated on it in each turn. What a replica keeps for a changed program
+//! alone stands behind x(i), and is no part of x(N+1).
 
 use understudy_executable::{Executable, Scratch};
 use understudy_wire::Image;
 
 use crate::replica::Stepped;
 
-/// y(N+1) of one cycle, where `steps` are the last steps of all replicas in the order of programs.
-///
-/// `None` where they are not the steps of all programs of `generated`.
-pub(crate) fn outputs<'a>(
-    generated: &Executable,
-    scratch: &mut Scratch,
-    steps: impl Iterator<Item = &'a Stepped>,
-) -> Option<Image> {
-    let (mut state, mut inputs) = (Packed::default(), Packed::default());
-    for step in steps {
-        state.append(&step.state);
-        inputs.append(&step.inputs);
+/// A generated parity controller.
+#[derive(Debug, Clone)]
+pub struct Generated {
+    /// Its circuit.
+    pub executable: Executable,
+    /// For each program the number of bits of x(i), the first ones of its state.
+    pub widths: Vec<usize>,
+}
+
+impl Generated {
+    /// y(N+1) of one cycle, where `steps` are the last steps of all replicas in the order of programs.
+    ///
+    /// `None` where they are not the steps of all its programs.
+    pub(crate) fn outputs<'a>(
+        &self,
+        scratch: &mut Scratch,
+        steps: impl ExactSizeIterator<Item = &'a Stepped>,
+    ) -> Option<Image> {
+        let Self { executable, widths } = self;
+        let (mut state, mut inputs) = (Packed::default(), Packed::default());
+        let are_all = steps.len() == widths.len();
+        for (step, &width) in steps.zip(widths) {
+            state.append(&step.state, width);
+            inputs.append(&step.inputs, step.inputs.width());
+        }
+        let fits =
+            state.width == executable.state_count() && inputs.width == executable.input_count();
+        if !are_all || !fits {
+            return None;
+        }
+        let mut outputs = Image::zero(executable.output_count());
+        executable.step(scratch, &mut state.words, &inputs.words, outputs.words_mut());
+        Some(outputs)
     }
-    if state.width != generated.state_count() || inputs.width != generated.input_count() {
-        return None;
-    }
-    let mut outputs = Image::zero(generated.output_count());
-    generated.step(scratch, &mut state.words, &inputs.words, outputs.words_mut());
-    Some(outputs)
 }
 
 /// A concatenation of images, which may be wider than one image.
@@ -43,10 +59,11 @@ struct Packed {
 }
 
 impl Packed {
-    fn append(&mut self, image: &Image) {
-        let end = self.width + image.width();
+    /// Appends the first bits of an image.
+    fn append(&mut self, image: &Image, width: usize) {
+        let end = self.width + width.min(image.width());
         self.words.resize(end.div_ceil(64), 0);
-        for (place, _) in (self.width..).zip(image.bits()).filter(|&(_, bit)| bit) {
+        for (place, _) in (self.width..end).zip(image.bits()).filter(|&(_, bit)| bit) {
             self.words[place / 64] |= 1 << (place % 64);
         }
         self.width = end;
@@ -64,8 +81,10 @@ mod tests {
         let mut packed = Packed::default();
         let mut expected = Vec::new();
         for width in widths {
-            packed.append(&image(width));
+            packed.append(&image(width), width);
             expected.extend(image(width).bits());
+            packed.append(&image(width), width / 2);
+            expected.extend(image(width).bits().take(width / 2));
         }
         assert_eq!(packed.width, expected.len());
         let whole = Image::from_words(packed.width, &packed.words).expect("no bit past the width");

@@ -11,6 +11,7 @@ mod station;
 mod words;
 
 pub use event::Event;
+pub use generated::Generated;
 pub use settings::Settings;
 pub use station::{STATES_EVERY, Station};
 pub use words::{of_controller as words_of_controller, of_understudy as words_of_understudy};

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use understudy_cycle::{Agreement, OnlineChange, Participant, Program, Versions};
-use understudy_executable::Executable;
 use understudy_wire::{ConfigurationHash, Moment, ProgramId, StationId};
 
 use crate::event::Event;
+use crate::generated::Generated;
 
 /// Configuration of one station.
 #[derive(Debug, Clone)]
@@ -19,7 +19,7 @@ pub struct Settings {
     pub programs: Arc<[Program]>,
     /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. Absent in the other mode, and where a
     /// program has numbers, for which there is no circuit: then the parity word is the sum of the outputs of its replicas (9).
-    pub generated: Option<Arc<Executable>>,
+    pub generated: Option<Arc<Generated>>,
     /// First moment of the epoch that it founds when it receives no other member: later than any earlier one of the cluster, such as that of the
     /// wall clock at its start.
     pub founds: Moment,

@@ -87,7 +87,7 @@ fn what_is_retentive_is_listed_and_proved_about() {
         lines.next().unwrap_or_default().to_owned()
     };
     let latch = line("latch.ladder");
-    assert!(latch.ends_with("right; retentive: seen, 1 of 2 state bits"), "{latch}");
+    assert!(latch.ends_with("right; retentive: seen, 1 of 3 state bits"), "{latch}");
     assert!(line("count.st").contains("; retentive: n, t, "), "{}", line("count.st"));
     let json = understudy_in(&folder, &[&files[..], &["--json"]].concat()).json();
     assert_eq!(json["result"]["files"][0]["retained"]["variables"][0], "seen");

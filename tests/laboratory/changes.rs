@@ -131,10 +131,22 @@ fn a_program_changes_while_stations_are_killed() {
     let (exit, document, errors) = answer(&["change", run_text, &after, "cancel", "--drop"]);
     assert_eq!(exit, 0, "{document:#} {errors}");
     records.wait_for("the change back", |record| is(record, "counter-io", "program-changed"));
+    let (exit, document, errors) = answer(&["change", run_text, &after, "cancel", "--drop"]);
+    assert_eq!(exit, 0, "cancelled already: {document:#} {errors}");
     done("prepare");
     done("accept");
     done("accept");
     records.wait_for("the new change", |record| is(record, "counter-io", "program-changed"));
+    // What was accepted is over: nothing loads it again, and nothing takes the program back.
+    for again in [&["prepare"][..], &["cancel", "--drop"], &["prepare"]] {
+        let given = [&["change", run_text, &after], again].concat();
+        let (exit, document, _) = answer(&given);
+        let failure = &document["failures"][0];
+        assert_eq!((exit, &failure["code"]), (1, &Value::from("U0632")), "{document:#}");
+        let why = failure["message"].as_str().unwrap_or_default();
+        assert!(why.contains("the change to it is over"), "{again:?}: {document:#}");
+    }
+    done("accept");
     signal(child.id(), Signal::SIGINT);
     child.wait().expect("it ends");
     no_orphan(&runs);

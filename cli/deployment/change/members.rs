@@ -10,7 +10,7 @@ use understudy_journal::{Command, OperatorAction, Refusal};
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
 use understudy_view::{Run, find_running_of};
-use understudy_wire::{ChangeRequest, Member};
+use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal};
 
 use super::{Arguments, Asked};
 use crate::answer::{Answer, Status};
@@ -70,7 +70,17 @@ impl<'a> Members<'a> {
             Way::Laboratory(run) => Some(written(run, texts, &json)?),
         };
         let mut asked = Asked::default();
-        for member in self.all() {
+        // Where the change is over, its remote I/Os say so, and no member loads it.
+        let decides = |member: &Member| {
+            let of = |program| [Member::RemoteIo(program), Member::Twin(program)].contains(member);
+            texts.programs.iter().any(|changed| of(changed.program))
+        };
+        let (first, others): (Vec<Member>, _) = self.all().into_iter().partition(decides);
+        for member in first.into_iter().chain(others) {
+            let is_over = |why: &String| gives(why, OrderRefusal::IsOver);
+            if asked.0.iter().any(|(.., said)| said.as_ref().is_err_and(is_over)) {
+                break;
+            }
             match &file {
                 None => self.note(
                     member,
@@ -93,6 +103,33 @@ impl<'a> Members<'a> {
             self.ask(member, request, &mut asked);
         }
         asked
+    }
+
+    /// Of what was refused because no change is loaded: a member that has this configuration alone is done, and one that has accepted the change says
+    /// so.
+    pub(super) fn find_done(
+        &self,
+        texts: &ChangeTexts,
+        configuration: ConfigurationHash,
+        asked: &mut Asked,
+    ) {
+        let accepted = OrderRefusal::OtherConfiguration { own: texts.after }.to_string();
+        for (member, _, said) in &mut asked.0 {
+            if !said.as_ref().is_err_and(|why| gives(why, OrderRefusal::NotPrepared)) {
+                continue;
+            }
+            let mut ended = Asked::default();
+            self.ask(*member, &ChangeRequest::Forget { configuration }, &mut ended);
+            let ended = ended.0.pop().map(|(.., said)| said);
+            match ended {
+                Some(Ok(())) => *said = Ok(()),
+                Some(Err(why)) if why.contains(&accepted) => {
+                    let refusal = OrderRefusal::IsOver;
+                    *said = Err(format!("{}: {refusal}", refusal.code()));
+                }
+                _ => {}
+            }
+        }
     }
 
     /// Asks one member, and notes what it says.
@@ -137,6 +174,11 @@ impl<'a> Members<'a> {
         let said = call.and_then(|call| call.ask(request)).map_err(|error| error.to_string())?;
         if said == DONE { Ok(()) } else { Err(said) }
     }
+}
+
+/// Whether a member refused for this reason.
+pub(super) fn gives(why: &str, reason: OrderRefusal) -> bool {
+    why.contains(&reason.to_string())
 }
 
 /// The running laboratory of the cluster.

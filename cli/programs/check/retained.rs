@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use understudy_bits::Exact;
-use understudy_ladder::circuit;
+use understudy_ladder::{Executed, Program as Ladder};
 use understudy_typed::Program;
 
 /// Names that a line lists.
@@ -24,16 +24,16 @@ pub(super) struct Retained {
 
 impl Retained {
     /// Of a program with retentive variables; of one that is written in rungs, of the circuit that stations execute.
-    pub(super) fn of(program: &Program, is_ladder: bool) -> Option<Self> {
+    pub(super) fn of(program: &Program, ladder: Option<&Ladder>) -> Option<Self> {
         if !program.is_retentive() {
             return None;
         }
-        let (mask, state_bits) = match is_ladder {
-            true => {
-                let Exact { circuit, layout } = circuit(program).ok()?;
+        let (mask, state_bits) = match ladder {
+            Some(ladder) => {
+                let Exact { circuit, layout, .. } = Executed::new(program, ladder).ok()?.kept;
                 (layout.retentive_mask(program), circuit.registers().len())
             }
-            false => (program.retentive_mask(), program.state as usize * 64),
+            None => (program.retentive_mask(), program.state as usize * 64),
         };
         let kept_bits = mask.iter().map(|word| word.count_ones() as usize).sum();
         Some(Self {

@@ -11,7 +11,7 @@ use understudy_wire::{
 use super::{ControllerTurn, Station, Token, place_of, replica_mut};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
-use crate::{generated, words};
+use crate::words;
 
 /// Time between two reports of the states that a station holds.
 pub const STATES_EVERY: Duration = Duration::from_secs(2);
@@ -202,7 +202,7 @@ impl Station {
             None => understudy_parity::sum(mask, outputs_of),
             Some(generated) => {
                 let steps = self.replicas.iter().map(Replica::last_step);
-                let sum = generated::outputs(generated, &mut self.scratch, steps)?;
+                let sum = generated.outputs(&mut self.scratch, steps)?;
                 Some(Word { mask, sum })
             }
         };

@@ -162,7 +162,7 @@ struct Pass<'s> {
 }
 
 /// The name, with a number behind it where it is taken.
-fn unique(taken: &mut HashSet<String>, name: &str) -> String {
+pub(crate) fn unique(taken: &mut HashSet<String>, name: &str) -> String {
     let mut unique = name.to_owned();
     let mut number = 1;
     while !taken.insert(unique.clone()) {

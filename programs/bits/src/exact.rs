@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
-use understudy_logic::{Circuit, CircuitBuilder, Expression, Variable as Bit};
+use understudy_logic::{Circuit, CircuitBuilder, Expression, Operation, Variable as Bit};
 use understudy_typed::{Comparison, Elementary, Program};
 
-use crate::circuit::{Derivation, Meaning};
+use crate::circuit::{Derivation, Meaning, unique};
 use crate::execute::Unsupported;
+use crate::extent::Extent;
 use crate::layout::Layout;
 use crate::system::System;
 use crate::term::{Node, Term, Variable};
@@ -75,6 +76,8 @@ pub struct Exact {
     pub circuit: Circuit,
     /// What its registers are in the state of the program.
     pub layout: Layout,
+    /// Outputs that are bits of points; behind them stands what is shown.
+    points: usize,
 }
 
 /// The circuit of a program whose values are finite; see [`Exact::new`].
@@ -126,10 +129,13 @@ impl Exact {
             Elementary::Bool => vec![point.name.clone()],
             of => (0..of.bits()).map(|bit| format!("{}.{bit}", point.name)).collect(),
         });
+        let known_points = points.filter(|name| known.contains_key(name.as_str()));
+        let points: Vec<String> = known_points.collect();
+        let count = points.len();
         let compared = shown.compared.iter().map(|compared| compared.name.clone());
         let further = shown.variables.iter().cloned().chain(compared);
         let mut names = HashSet::new();
-        let outputs = points.chain(further).filter(|name| names.insert(name.clone()));
+        let outputs = points.into_iter().chain(further).filter(|name| names.insert(name.clone()));
         let outputs: Vec<(String, Expression)> = outputs
             .filter_map(|name| known.get(name.as_str()).map(|&value| (name, value)))
             .collect();
@@ -144,7 +150,62 @@ impl Exact {
             return Err(Inexact::Gaps(gaps.into_iter().collect()));
         }
         let layout = Layout::new(program, &system, &derivation, &live);
-        Ok(Self { circuit: pruned(&system, &derivation, &outputs, &live, stops), layout })
+        let circuit = pruned(&system, &derivation, &outputs, &live, stops);
+        Ok(Self { circuit, layout, points: count })
+    }
+
+    /// The circuit without what it shows.
+    pub fn of_points(&self) -> Circuit {
+        let mut builder = CircuitBuilder::like(&self.circuit);
+        self.copied(&mut builder);
+        builder.finish().expect("it is a part of a circuit")
+    }
+
+    /// The same as it is executed: behind the registers that its scans read, its state has all BOOLs that are shown and have none of them, as they are
+    /// after the scan. So a program that takes its place finds the value of each, whether this one reads it or not.
+    pub fn keeping_shown(&self, program: &Program) -> Self {
+        let Self { circuit, layout, points } = self;
+        let mut builder = CircuitBuilder::like(circuit);
+        let values = self.copied(&mut builder);
+        let initial = program.initial_state();
+        let mut names: HashSet<String> =
+            circuit.registers().iter().map(|register| register.name.clone()).collect();
+        let mut kept = Vec::new();
+        for (output, value) in circuit.outputs().iter().zip(values) {
+            let part = program.part(&output.name);
+            let part = part.filter(|part| part.of.elementary() == Some(Elementary::Bool));
+            let Some(address) = part.map(|part| part.address) else {
+                continue;
+            };
+            if layout.has_value(address) {
+                continue;
+            }
+            let begins = initial[(address / 64) as usize] >> (address % 64) & 1 == 1;
+            let extent = match builder.graph().operation(value) {
+                Operation::Constant(always) if always == begins => {
+                    Extent::new(begins.into(), begins.into())
+                }
+                _ => {
+                    let name = unique(&mut names, &output.name);
+                    let (register, _) = builder.register(name, begins);
+                    builder.set_next(register, value);
+                    Extent::of(Elementary::Bool)
+                }
+            };
+            kept.push((address, extent));
+        }
+        let circuit = builder.finish().expect("names of registers are unique");
+        Self { circuit, layout: layout.keeping(&kept), points: *points }
+    }
+
+    /// Copies the functions and the outputs of points; the values of all outputs.
+    fn copied(&self, builder: &mut CircuitBuilder) -> Vec<Expression> {
+        let values =
+            builder.copy_functions(&self.circuit, |graph, variable| graph.variable(variable));
+        for (output, &value) in self.circuit.outputs()[..self.points].iter().zip(&values) {
+            builder.output(&output.name, value);
+        }
+        values
     }
 }
 
@@ -197,7 +258,7 @@ fn live(circuit: &Circuit, mut roots: Vec<Expression>, kept: BTreeSet<Bit>) -> B
         let operations = circuit.graph().operations().iter().zip(reached);
         let mut more = Vec::new();
         for (operation, is_reached) in operations {
-            if let (understudy_logic::Operation::Variable(variable), true) = (operation, is_reached)
+            if let (Operation::Variable(variable), true) = (operation, is_reached)
                 && live.insert(*variable)
                 && let Bit::Register(register) = variable
             {

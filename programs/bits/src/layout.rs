@@ -5,7 +5,7 @@ mod registers;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use understudy_logic::Variable as Bit;
-use understudy_typed::Program;
+use understudy_typed::{Elementary, Program};
 
 use crate::System;
 use crate::circuit::Derivation;
@@ -78,6 +78,26 @@ impl Layout {
         let initial = program.initial_state();
         let together = together(program);
         Self { initial, period: program.period.max(1), together, cells, registers, told }
+    }
+
+    /// The same with BOOLs behind all others, each with its address: one that can change has the next register.
+    pub(crate) fn keeping(&self, bits: &[(u64, Extent)]) -> Self {
+        let mut layout = self.clone();
+        for &(address, extent) in bits {
+            let place = layout.cells.len();
+            layout.cells.push((Holds::Value(address, Elementary::Bool), extent));
+            layout.told.insert(address, place);
+            if extent.low < extent.high {
+                layout.registers.push((place, 1));
+            }
+        }
+        layout
+    }
+
+    /// Whether a cell has the value at an address, and not what follows from it alone.
+    pub(crate) fn has_value(&self, address: u64) -> bool {
+        let cell = self.told.get(&address).map(|&place| &self.cells[place].0);
+        matches!(cell, Some(Holds::Value(..)))
     }
 
     /// The registers that a warm start keeps, packed; see [`Program::retentive_mask`].

@@ -36,7 +36,7 @@ pub use draw::{draw_svg, draw_svg_rungs, draw_text, draw_text_rungs};
 pub use flow::{ElementFlow, Evaluation, Reading, RungFlow};
 pub use from_circuit::from_circuit;
 pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address};
-pub use lower::{LowerError, PERIODS, Write, circuit};
+pub use lower::{Executed, LowerError, PERIODS, Write, circuit};
 pub use names::{Language, Namer, StandardNames, legal_name};
 pub use observer::{Interpreter, Observer};
 pub use parser::{

@@ -113,7 +113,39 @@ pub fn circuit(typed: &Typed) -> Result<Exact, LowerError> {
     exact(typed, Shown::default())
 }
 
+/// A ladder as stations execute it.
+#[derive(Debug, Clone)]
+pub struct Executed {
+    /// Its circuit, as [`circuit`] gives it: the first registers of a state are those of this one.
+    pub circuit: Circuit,
+    /// The circuit whose registers are the state. Behind those that scans read it has all signals and the BOOLs that blocks show, as the last scan has
+    /// left them: a changed program may read each of them.
+    pub kept: Exact,
+}
+
+impl Executed {
+    /// Of a ladder whose typed program is `typed`.
+    ///
+    /// # Errors
+    /// A program that is too large.
+    pub fn new(typed: &Typed, ladder: &Program) -> Result<Self, LowerError> {
+        let variables = ladder.shown();
+        let shown = exact(typed, Shown { variables: &variables, ..Shown::default() })?;
+        Ok(Self { circuit: shown.of_points(), kept: shown.keeping_shown(typed) })
+    }
+}
+
 impl Program {
+    /// The memory bits, and the output pins of the blocks that are BOOLs, such as `pause.Q`.
+    fn shown(&self) -> Vec<String> {
+        let blocks = self.blocks();
+        let pins = blocks.iter().flat_map(|block| {
+            let pins = block.kind.outputs().iter();
+            pins.map(|pin| format!("{}.{pin}", block.name))
+        });
+        self.memory.iter().map(|signal| signal.name.to_string()).chain(pins).collect()
+    }
+
     /// The typed program that does what the scan of this program does, one scan a step, with `period` from one to the next. Its points and
     /// variables have the names of the ladder; what sees the edges of `a` is named `a.rising` or `a.falling`, and what sees those of
     /// the power of a coil `y` is named `y.power.rising` or `y.power.falling`.
@@ -183,13 +215,7 @@ impl Program {
         restarts: bool,
     ) -> Result<Circuit, LowerError> {
         validate(self, period)?;
-        let blocks = self.blocks();
-        let pins = blocks.iter().flat_map(|block| {
-            let pins = block.kind.outputs().iter();
-            pins.map(|pin| format!("{}.{pin}", block.name))
-        });
-        let memory = self.memory.iter().map(|signal| signal.name.to_string());
-        let variables: Vec<String> = memory.chain(pins).collect();
+        let variables = self.shown();
         let compared = compared.iter().map(|(name, comparison)| Compared {
             name: name.clone(),
             number: format!("{}.CV", comparison.counter),

@@ -239,17 +239,18 @@ fn partners(old: &Program, new: &Program, others: &HashMap<String, String>) -> V
     let all: HashMap<&str, usize> = if others.is_empty() {
         HashMap::new()
     } else {
-        let names = old.variables.iter().map(|variable| variable.name.as_str());
+        let names = old.named().map(|variable| variable.name.as_str());
         names.zip(0..).collect()
     };
     let mut known: HashMap<&str, usize> = HashMap::new();
     // The names of a ladder may differ in their case alone, those of all other languages do not.
     let mut folded: HashMap<String, &str> = HashMap::new();
-    for (place, variable) in old.variables.iter().enumerate() {
+    for (place, variable) in old.named().enumerate() {
         known.insert(&variable.name, place);
         folded.insert(variable.name.to_ascii_lowercase(), &variable.name);
     }
-    let names = new.variables.iter().map(|variable| variable.name.as_str());
+    let names: Vec<&str> = new.named().map(|variable| variable.name.as_str()).collect();
+    let names = names.into_iter();
     let exact: Vec<Option<usize>> = names.clone().map(|name| known.remove(name)).collect();
     let in_other_case = |(name, exact): (&str, Option<usize>)| {
         exact
@@ -302,12 +303,13 @@ impl<'p> Walk<'p> {
     fn variables(&mut self, partners: &[Option<usize>]) -> Vec<CarriedPath> {
         let (old, new) = (self.old, self.new);
         let spot = |of: &'p crate::form::Variable| Spot { of: &of.of, slot: of.slot };
-        let mut is_taken = vec![false; old.variables.len()];
+        let known: Vec<&crate::form::Variable> = old.named().collect();
+        let mut is_taken = vec![false; known.len()];
         let mut paths = Vec::new();
-        for (variable, partner) in new.variables.iter().zip(partners) {
+        for (variable, partner) in new.named().zip(partners) {
             let partner = partner.map(|place| {
                 is_taken[place] = true;
-                spot(&old.variables[place])
+                spot(known[place])
             });
             paths.extend(self.part(&variable.name, partner, Some(spot(variable))));
         }
@@ -315,7 +317,7 @@ impl<'p> Walk<'p> {
             let path = "memory without a name".to_owned();
             paths.push(CarriedPath { path, fate: Fate::Dropped, before: None, now: None });
         }
-        for (variable, _) in old.variables.iter().zip(is_taken).filter(|(_, taken)| !taken) {
+        for (variable, _) in known.into_iter().zip(is_taken).filter(|(_, taken)| !taken) {
             paths.extend(self.part(&variable.name, Some(spot(variable)), None));
         }
         paths

@@ -40,6 +40,8 @@ pub struct Program {
     pub tasks: Vec<Task>,
     /// Variables of the programs and the global ones, in the order in which people see them; parts are found through their types.
     pub variables: Vec<Variable>,
+    /// Memory of the programs that no person declared, such as that of their charts: an online change finds it by these names.
+    pub hidden: Vec<Variable>,
     /// u; the last one is the reset, where [`Program::seal_points`] was called.
     pub inputs: Points,
     /// y; the last one is the fault, where [`Program::seal_points`] was called.
@@ -91,6 +93,11 @@ impl Program {
     /// If the program has no such routine.
     pub fn routine(&self, id: RoutineId) -> &Routine {
         &self.routines[id.0 as usize]
+    }
+
+    /// What has a name in the state: the variables, and the memory that no person declared.
+    pub(crate) fn named(&self) -> impl Iterator<Item = &Variable> {
+        self.variables.iter().chain(&self.hidden)
     }
 
     /// Gives variables and points other names: each name is found with its new one.

@@ -32,7 +32,7 @@ impl Program {
     /// The same program, all of whose variables are retentive.
     pub(crate) fn all_retentive(&self) -> Self {
         let mut whole = self.clone();
-        for variable in &self.variables {
+        for variable in self.named() {
             let end = variable.slot.saturating_add(variable.of.slots() as u32);
             // What lives in the frames of one scan is no state.
             whole.retain(variable.slot..end.min(self.state));
@@ -69,7 +69,7 @@ impl Program {
     /// Whether a slot is retentive that no variable has.
     pub(crate) fn has_unnamed_retentive(&self) -> bool {
         let mut named = Self { state: self.state, ..Self::default() };
-        for variable in &self.variables {
+        for variable in self.named() {
             named.retain(variable.slot..variable.slot.saturating_add(variable.of.slots() as u32));
         }
         let is_named = |slots: &Range<u32>| {

@@ -53,6 +53,7 @@ pub(crate) fn typed_text(program: &TypedProgram) -> String {
         routines,
         tasks,
         variables,
+        hidden,
         inputs,
         outputs,
         state,
@@ -65,8 +66,12 @@ pub(crate) fn typed_text(program: &TypedProgram) -> String {
         true => String::new(),
         false => format!("retained {retained:?}\n"),
     };
+    let hidden = match hidden.is_empty() {
+        true => String::new(),
+        false => format!("hidden {hidden:?}\n"),
+    };
     format!(
-        "typed program\nperiod {period}\nbudget {budget}\nmemory {state} {frames}\n{inputs:#?}\n{outputs:#?}\n{tasks:#?}\n{initial:?}\n{routines:#?}\n{variables:?}\n{structures:?}\n{enumerations:?}\n{kept}"
+        "typed program\nperiod {period}\nbudget {budget}\nmemory {state} {frames}\n{inputs:#?}\n{outputs:#?}\n{tasks:#?}\n{initial:?}\n{routines:#?}\n{variables:?}\n{structures:?}\n{enumerations:?}\n{kept}{hidden}"
     )
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
-use understudy_typed::{CarriedPath, Successor};
+use understudy_typed::{CarriedPath, Fate, Successor};
 use understudy_wire::{ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
 use crate::cluster::Cluster;
@@ -367,11 +367,11 @@ pub struct ChangedInitial {
     pub values: Option<[String; 2]>,
 }
 
-/// Which of these paths, that go on with their values, begin with other ones in the program after: those count at its next start only.
+/// Which of these paths, that go on with every value, begin with other ones in the program after: those count at its next start only.
 pub fn changed_initials(before: &Code, after: &Code, paths: &[CarriedPath]) -> Vec<ChangedInitial> {
     let programs = [before, after].map(|code| code.typed());
     let states = programs.map(|program| program.initial_state());
-    let goes_on = |path: &&CarriedPath| path.before.is_some() && path.now.is_some();
+    let goes_on = |path: &&CarriedPath| matches!(path.fate, Fate::Kept | Fate::Converted);
     let changed = paths.iter().filter(goes_on).filter_map(|path| {
         let [old, new] = programs.map(|program| program.part(&path.path));
         let parts = [old?, new?];

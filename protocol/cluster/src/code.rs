@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use understudy_bits::{Exact, Inexact, Layout, exact};
 use understudy_executable::{Executable, Interface};
-use understudy_ladder::{LowerError, Program as LadderProgram, circuit};
+use understudy_ladder::{Executed, LowerError, Program as LadderProgram};
 use understudy_logic::Circuit;
 use understudy_typed::{
     CarriedPath, CarriedState, EdgeMemory, Fate, Program as TypedProgram, Successor, Told,
@@ -48,8 +48,10 @@ pub enum Unnamed {
 #[derive(Debug, Clone)]
 struct Rungs {
     ladder: LadderProgram,
+    /// What stations execute but for the signals that it keeps and does not read.
     circuit: Circuit,
-    /// The circuit as stations execute it.
+    /// The circuit with all signals in its state, as stations execute it.
+    kept: Circuit,
     executable: Executable,
     /// What its registers are in the state of the program.
     layout: Layout,
@@ -67,11 +69,12 @@ impl Code {
         ladder: LadderProgram,
         source: Arc<SourceText>,
     ) -> Result<Self, LowerError> {
-        let Exact { circuit, layout } = circuit(&typed)?;
+        let Executed { circuit, kept } = Executed::new(&typed, &ladder)?;
         let circuit = circuit.named(ladder.name.as_str());
+        let Exact { circuit: kept, layout, .. } = kept;
         let retentive = layout.retentive_mask(&typed);
-        let executable = Executable::from(&circuit).keeping(retentive.clone());
-        let rungs = Rungs { ladder, circuit, executable, layout, retentive };
+        let executable = Executable::from(&kept).keeping(retentive.clone());
+        let rungs = Rungs { ladder, circuit, kept, executable, layout, retentive };
         Ok(Self { typed, source, body: Body::Rungs(Box::new(rungs)) })
     }
 
@@ -98,7 +101,7 @@ impl Code {
         }
     }
 
-    /// The circuit that stations execute, of one that is written in rungs.
+    /// The circuit of one that is written in rungs: its registers are the first ones of a state, behind which stand signals that no scan reads.
     pub fn circuit(&self) -> Option<&Circuit> {
         match &self.body {
             Body::Rungs(rungs) => Some(&rungs.circuit),
@@ -225,20 +228,31 @@ impl Code {
         let fields = self.typed.structures.iter().flat_map(|of| &of.fields);
         let fields = fields.map(|field| field.name.as_str());
         let variables = self.typed.variables.iter().map(|variable| variable.name.as_str());
-        let mut names = variables.chain(fields);
-        if let Some(edges) = names.clone().find_map(|name| self.several_edges(name)) {
+        let mut names = variables.clone().chain(fields.clone());
+        if let Some(edges) = names.find_map(|name| self.several_edges(name)) {
             return Some(Unnamed::SeveralEdges(edges.to_owned()));
         }
+        // Of several programs, each name of theirs stands behind the instance; of one that is counted, another change may count others.
+        let is_plain = |name: &str| !name.contains('#');
         // Parts of a chart have names that stay where other parts change.
-        let stays = |name: &str| {
+        let is_of_chart = |name: &str| {
             let parts = ["begun.", "timer.", "stored.", "fires."];
-            !name.contains('.')
-                || parts.iter().any(|part| name.starts_with(part))
-                || EdgeMemory::named(name).is_some()
+            parts.iter().any(|part| name.starts_with(part))
         };
+        let stays = |name: &str| {
+            !name.contains('.') || is_of_chart(name) || EdgeMemory::named(name).is_some()
+        };
+        let is_hidden_of_chart = |name: &str| {
+            let own = name.split_once('.').map_or(name, |(_, own)| own);
+            is_of_chart(name) || is_of_chart(own)
+        };
+        let mut hidden = self.typed.hidden.iter().map(|variable| variable.name.as_str());
         // Of rungs, all other memory is that of their signals and blocks.
-        let is_named =
-            self.ladder().is_some() || names.all(stays) && self.typed.has_names_for_all();
+        let is_named = self.ladder().is_some()
+            || variables.into_iter().all(is_plain)
+                && fields.into_iter().all(stays)
+                && hidden.all(is_hidden_of_chart)
+                && self.typed.has_names_for_all();
         (!is_named).then_some(Unnamed::Memory)
     }
 
@@ -297,7 +311,7 @@ impl Code {
     /// The canonical text that its hash is of: equal texts mean equal behaviour, and equal states.
     pub(crate) fn text(&self) -> String {
         match &self.body {
-            Body::Rungs(rungs) => circuit_text(&rungs.circuit, &rungs.retentive),
+            Body::Rungs(rungs) => circuit_text(&rungs.kept, &rungs.retentive),
             Body::Text => typed_text(&self.typed),
         }
     }

@@ -27,12 +27,18 @@ impl Cluster {
             station,
             agreement: Arc::clone(&self.agreement),
             programs: Arc::clone(&self.programs),
-            generated: self
-                .parity
-                .as_ref()
-                .filter(|_| evaluates_generated)
-                .map(|parity| Arc::new(parity.circuit().into())),
+            generated: self.generated().filter(|_| evaluates_generated).map(Arc::new),
             founds,
+        })
+    }
+
+    /// The generated parity controller, on the first registers of the states that stations hold.
+    fn generated(&self) -> Option<understudy_node::Generated> {
+        let circuits = self.controllers.iter().map(|controller| controller.code.circuit());
+        let widths = circuits.map(|circuit| Some(circuit?.registers().len()));
+        Some(understudy_node::Generated {
+            executable: self.parity.as_ref()?.circuit().into(),
+            widths: widths.collect::<Option<_>>()?,
         })
     }
 

@@ -191,6 +191,11 @@ pub enum OrderRefusal {
     /// The member has not loaded the change.
     #[error("this member has not loaded the change: prepare it first")]
     NotPrepared,
+    /// The remote I/O runs the new program, and the change is over.
+    #[error(
+        "the new program runs already, and the change to it is over: to go back, change from the new cluster file to the old one"
+    )]
+    IsOver,
     /// Stations that compute the program and are received have not loaded the change: they would be silent after the switch.
     #[error("stations that compute the program have not loaded the change: {}", stations_text(*.stations))]
     StationsNotPrepared {
@@ -224,6 +229,7 @@ impl OrderRefusal {
             Self::AnotherChange
             | Self::OtherConfiguration { .. }
             | Self::NotPrepared
+            | Self::IsOver
             | Self::NotRunning => "U0632",
             Self::StillNeeded => "U0634",
             Self::StationsNotPrepared { .. } => "U0636",

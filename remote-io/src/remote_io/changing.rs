@@ -66,6 +66,11 @@ impl RemoteIo {
             }
             return self.member.put(Output::Obeyed(outcome));
         }
+        if let ChangeOrder::Prepare(change) = order
+            && self.has_left_behind(change)
+        {
+            return self.member.put(Output::Obeyed(Err(OrderRefusal::IsOver)));
+        }
         let own = self.hash();
         let may_forget = self.knowledge.run().is_none_or(|run| run.history.is_of(own));
         let before = self.member.changing().change().cloned();
@@ -77,6 +82,14 @@ impl RemoteIo {
             self.wanted = None;
             self.prepared = StationSet::EMPTY;
         }
+    }
+
+    /// Whether a change was accepted: its history is one of the new program, and nothing else is loaded. What is over cannot be cancelled.
+    fn has_left_behind(&self, change: &OnlineChange) -> bool {
+        let changing = self.member.changing();
+        let own = self.hash();
+        let runs = self.knowledge.run().is_some_and(|run| run.history.is_of(own));
+        runs && changing.change().is_none() && changing.configurations().own == change.after
     }
 
     /// Takes the program of one of the configurations of a change for its own.

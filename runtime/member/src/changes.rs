@@ -44,8 +44,12 @@ pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> Star
         .retain
         .as_ref()
         .map(|folder| folder.join(format!("{}.{}.change", cluster.name(), options.name)));
-    let mut keeper =
-        Keeper { cluster: cluster.clone(), kept: KeptChanges::default(), file: file.clone() };
+    let mut keeper = Keeper {
+        cluster: cluster.clone(),
+        kept: KeptChanges::default(),
+        loaded: None,
+        file: file.clone(),
+    };
     let restored = file.as_ref().map_or(Ok(None), |file| keeper.start(file));
     let (restored, problem) = match restored {
         Ok(restored) => (restored, None),
@@ -74,6 +78,8 @@ struct Keeper {
     /// With the programs of the changes that were accepted.
     cluster: Cluster,
     kept: KeptChanges,
+    /// The texts that were loaded last, which the cycle may refuse.
+    loaded: Option<ChangeTexts>,
     /// Nothing where the member keeps nothing.
     file: Option<PathBuf>,
 }
@@ -156,11 +162,7 @@ impl ChangeKeeper for Keeper {
         let texts: ChangeTexts = serde_json::from_str(texts)
             .map_err(|error| format!("U0631: these are no texts of an online change: {error}"))?;
         let change = texts.load(&self.cluster).map_err(|error| format!("U0631: {error}"))?;
-        // Another change is refused by the cycle while one is loaded.
-        if self.kept.current.is_none() {
-            let own = self.cluster.agreement().configuration;
-            self.kept.current = Some((texts, Configurations { own, prepared: None }));
-        }
+        self.loaded = Some(texts);
         Ok(Arc::new(change))
     }
 
@@ -174,11 +176,15 @@ impl ChangeKeeper for Keeper {
     }
 
     fn keep(&mut self, configurations: Configurations) -> Result<String, String> {
+        if configurations.prepared.is_some() {
+            // Another change is refused by the cycle while one is loaded.
+            let current = self.kept.current.take().map(|(texts, _)| texts);
+            let texts = current.or_else(|| self.loaded.take());
+            self.kept.current = texts.map(|texts| (texts, configurations));
+        }
         let text = self.text(configurations.own);
         if configurations.prepared.is_none() {
             self.end(configurations.own).map_err(|error| format!("U0631: {error}"))?;
-        } else if let Some((_, kept)) = &mut self.kept.current {
-            *kept = configurations;
         }
         let is_empty = self.kept.accepted.is_empty() && self.kept.current.is_none();
         let kept = match &self.file {
@@ -236,7 +242,7 @@ mod tests {
     /// A member that starts with this cluster file: its configurations, and what takes changes.
     fn start(file: &Path, cluster: &Cluster) -> (Result<Configurations, String>, Keeper) {
         let (cluster, kept) = (cluster.clone(), KeptChanges::default());
-        let mut keeper = Keeper { cluster, kept, file: Some(file.to_owned()) };
+        let mut keeper = Keeper { cluster, kept, loaded: None, file: Some(file.to_owned()) };
         let restored = keeper.start(file);
         let own = hash(&keeper.cluster);
         let none = Configurations { own, prepared: None };

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{EdgeMemory, Elementary, Root, Task, Type, Variable as Shown};
+use understudy_typed::{EdgeMemory, Elementary, Program, Root, Task, Type, Variable as Shown};
 
 use crate::syntax::{
     Argument, Class, Declaration, Expression, File, Name, Retention, Span, Unit, UnitKind,
@@ -303,9 +303,8 @@ impl<'a> Lowering<'a> {
                 continue;
             };
             // Memories that no person declared, as of charts; what sees the edges of something is named by it.
-            if variable.name.contains('.') && EdgeMemory::named(&variable.name).is_none() {
-                continue;
-            }
+            let is_hidden =
+                variable.name.contains('.') && EdgeMemory::named(&variable.name).is_none();
             let parameter = parameters.get(variable.name.as_str()).copied();
             let slot = match (variable.root, parameter) {
                 (_, Some(parameter)) => own + parameter.slot,
@@ -331,7 +330,9 @@ impl<'a> Lowering<'a> {
             {
                 self.point(&shown, variable, slot, member.class == Class::Input);
             }
-            self.program.variables.push(Shown {
+            let Program { variables, hidden, .. } = &mut self.program;
+            let of_it = if is_hidden { hidden } else { variables };
+            of_it.push(Shown {
                 name: shown,
                 of: variable.of.clone(),
                 slot,

@@ -1,11 +1,12 @@
 //! Online changes of ladders: what did not change goes on as if nothing had happened.
 
 use proptest::prelude::*;
-use understudy_cluster::{ChangeTexts, Cluster, NeedsStop};
+use understudy_cluster::{ChangeTexts, Cluster, Code, NeedsStop, fates};
 use understudy_cycle::{OnlineChange, ProgramChange};
 use understudy_executable::{Executable, Scratch};
 use understudy_ladder::{Coil, CoilKind, Contact, ContactKind, Element, Rung, Signal, print};
 use understudy_testing::random::{Dice, random_program};
+use understudy_typed::{CarriedPath, Fate, Machine, Program};
 
 use crate::common::{findings, load};
 
@@ -182,4 +183,154 @@ fn a_counter_with_a_lower_preset_is_full() {
     };
     let found = outputs(&text(9), &text(3), 8, &[1, 0, 1, 0, 1, 0, 1, 0, 0, 1, 2, 0]);
     assert_eq!(found, [0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0]);
+}
+
+/// A program that a naive reference executes: statement by statement, on all its variables.
+struct Reference<'a> {
+    program: &'a Program,
+    machine: Machine,
+    state: Vec<u64>,
+}
+
+impl<'a> Reference<'a> {
+    fn new(program: &'a Program) -> Self {
+        Self { program, machine: Machine::new(program), state: program.initial_state() }
+    }
+
+    fn step(&mut self, inputs: &[u64]) -> Vec<u64> {
+        let mut outputs = vec![0; self.machine.output_count().div_ceil(64)];
+        let scratch = &mut understudy_typed::Scratch::default();
+        self.machine.step(scratch, &mut self.state, inputs, &mut outputs);
+        outputs
+    }
+
+    /// Another program with the slots of all variables of the same names.
+    fn changed<'b>(&self, to: &'b Program) -> Reference<'b> {
+        let mut changed = Reference::new(to);
+        let header = Program::HEADER as usize;
+        changed.state[..header].copy_from_slice(&self.state[..header]);
+        for variable in &to.variables {
+            let mut known = self.program.variables.iter();
+            if let Some(old) = known.find(|old| old.name == variable.name) {
+                let slots = variable.of.slots() as usize;
+                let (from, to) = (old.slot as usize, variable.slot as usize);
+                changed.state[to..to + slots].copy_from_slice(&self.state[from..from + slots]);
+            }
+        }
+        changed
+    }
+}
+
+/// One more rung at a random place, which reads a signal or an output of a block that may be read by no other rung: what is read is what the
+/// old program had computed.
+#[test]
+fn a_rung_that_is_added_reads_what_the_old_program_had_computed() {
+    let (mut changes, mut newly_read) = (0, 0);
+    for seed in 0..300 {
+        let mut program = random_program(seed, 6);
+        let before = print(&program);
+        let mut dice = Dice::new(!seed);
+        let signals = program.writable().map(|signal| signal.name.to_string());
+        let blocks = program.blocks();
+        let pins = blocks.iter().flat_map(|block| {
+            let pins = block.kind.outputs().iter();
+            pins.map(|pin| format!("{}.{pin}", block.name))
+        });
+        let read: Vec<String> = signals.chain(pins).collect();
+        let contact = |kind, operand: String| {
+            Element::Contact(Contact { kind, operand: operand.as_str().into() })
+        };
+        let input = program.inputs[dice.below(program.inputs.len())].name.to_string();
+        let seal = vec![
+            vec![contact(ContactKind::NormallyOpen, input.clone())],
+            vec![contact(ContactKind::NormallyOpen, dice.pick(&read))],
+        ];
+        let target = program.outputs[dice.below(program.outputs.len())].name.clone();
+        let rung = Rung {
+            network: vec![Element::Branches(seal), contact(ContactKind::NormallyClosed, input)],
+            coils: vec![Coil { kind: CoilKind::Plain, target }],
+            ..Rung::default()
+        };
+        program.rungs.insert(dice.below(program.rungs.len() + 1), rung);
+        let after = print(&program);
+        let clusters = [&before, &after].map(|text| cluster("one.ladder", text));
+        let codes = clusters.each_ref().map(|cluster| &cluster.controllers()[0].code);
+        let Ok(change) = change("one.ladder", &before, &after) else { continue };
+        let [change] = &change.programs[..] else { continue };
+        changes += 1;
+        let lost = |path: &CarriedPath| path.fate == Fate::Dropped;
+        let fates = fates(codes[0], codes[1]);
+        assert!(!fates.iter().any(lost), "seed {seed}: {fates:?}\n{before}to\n{after}");
+        let registers = |code: &Code| code.circuit().map_or(0, |of| of.registers().len());
+        newly_read += u32::from(registers(codes[1]) > registers(codes[0]));
+        let mut running = Running::new(&change.before.executable);
+        let mut reference = Reference::new(codes[0].typed());
+        let mut inputs = vec![0_u64; change.before.executable.input_count().div_ceil(64)];
+        let switch = dice.below(40);
+        for scan in 0..80 {
+            if scan == switch {
+                let state = change.forward.convert(&running.state);
+                running = Running { executable: &change.after.executable, state };
+                reference = reference.changed(codes[1].typed());
+            }
+            if dice.rarely(2) {
+                let place = dice.below(change.before.executable.input_count());
+                inputs[place / 64] ^= 1 << (place % 64);
+            }
+            let (wanted, found) = (reference.step(&inputs), running.step(&inputs));
+            assert_eq!(
+                found, wanted,
+                "scan {scan}, switch {switch}, seed {seed}\n{before}to\n{after}"
+            );
+        }
+    }
+    assert!(changes > 100 && newly_read > 20, "{changes} changes, {newly_read} newly read");
+}
+
+/// The motor runs, and the rung that is added holds it.
+#[test]
+fn a_seal_in_that_is_added_holds_what_runs() {
+    let text = |rung: &str| {
+        format!("program one\ninput start\ninput stop\noutput motor\nrung\n    {rung} ( motor )\n")
+    };
+    let found =
+        outputs(&text("start /stop"), &text("[ start | motor ] /stop"), 2, &[1, 1, 0, 0, 2, 0]);
+    assert_eq!(found, [1, 1, 1, 1, 0, 0]);
+}
+
+/// A chart that is the body of a PROGRAM goes on in its active step, in a program that is alone and in one of several.
+#[test]
+fn a_chart_goes_on_in_its_active_step() {
+    let text = |more: &str, ends: &str| {
+        format!(
+            "PROGRAM one\nVAR_INPUT a, b : BOOL; END_VAR\nVAR_OUTPUT y : BOOL; END_VAR\n\
+             INITIAL_STEP idle: END_STEP\nSTEP work: y(N); END_STEP\n\
+             TRANSITION FROM idle TO work := a; END_TRANSITION\n\
+             TRANSITION FROM work TO idle := {ends}; END_TRANSITION\nEND_PROGRAM\n{more}"
+        )
+    };
+    let several = "PROGRAM two\nVAR_INPUT c : BOOL; END_VAR\nVAR_OUTPUT z : BOOL; END_VAR\nz := c;\nEND_PROGRAM\n\
+                   CONFIGURATION c RESOURCE r ON PLC TASK t(INTERVAL := T#100ms, PRIORITY := 1);\n\
+                   PROGRAM i1 WITH t : one; PROGRAM i2 WITH t : two; END_RESOURCE END_CONFIGURATION\n";
+    for more in ["", several] {
+        let change = change("one.st", &text(more, "b"), &text(more, "b AND NOT a"));
+        let change = change.unwrap_or_else(|reasons| panic!("{reasons:?}"));
+        let change = &change.programs[0];
+        let mut running = Running::new(&change.before.executable);
+        let [a, both, b] = [1, 3, 2];
+        // It begins in the first scan, works, and is changed and changed back while it works.
+        running.step(&[0]);
+        running.step(&[a]);
+        assert_eq!(running.step(&[0])[0] & 1, 1, "it works");
+        let state = change.forward.convert(&running.state);
+        let mut running = Running { executable: &change.after.executable, state };
+        for inputs in [0, both, both] {
+            assert_eq!(running.step(&[inputs])[0] & 1, 1, "it goes on, and ends in another way");
+        }
+        let state = change.back.convert(&running.state);
+        let mut running = Running { executable: &change.before.executable, state };
+        assert_eq!(running.step(&[0])[0] & 1, 1, "it goes on");
+        running.step(&[b]);
+        assert_eq!(running.step(&[0])[0] & 1, 0, "it is over as before");
+    }
 }
