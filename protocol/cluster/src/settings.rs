@@ -65,10 +65,8 @@ impl Cluster {
                 .executable
                 .is_retentive()
                 .then_some(remote_io.restart),
-            pair: remote_io
-                .twin
-                .as_ref()
-                .map(|twin| PairSettings { is_twin: false, take_over_after: twin.take_over_after }),
+            pair: remote_io.twin.as_ref().map(|twin| PairSettings::exclusive(twin.take_over_after)),
+            paired_inputs: Vec::new(),
         })
     }
 

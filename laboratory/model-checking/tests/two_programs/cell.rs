@@ -84,7 +84,7 @@ fn plant() -> Circuit {
 pub(crate) fn paired(take_over_after: u32) -> Parts {
     let mut parts = cell(&[program(false)], (1, 0), Turns::Token);
     for remote_io in &mut parts.remote_ios {
-        remote_io.pair = Some(PairSettings { is_twin: false, take_over_after });
+        remote_io.pair = Some(PairSettings::exclusive(take_over_after));
     }
     parts
 }
@@ -151,6 +151,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         stale_state: StaleState::Operator,
         restart: None,
         pair: None,
+        paired_inputs: Vec::new(),
     });
     let plants = circuits.iter().map(|circuit| {
         let kind = ModelKind::Program(Box::new((&plant()).into()));
