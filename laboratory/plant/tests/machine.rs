@@ -52,6 +52,7 @@ fn machine() -> PlantMachine {
             follows: Vec::new(),
             fail_safe: Image::from_bits([false, true]),
             watchdog_cycles: WATCHDOG_CYCLES,
+            has_two_modules: false,
         },
         Time(0),
     )
