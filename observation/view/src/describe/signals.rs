@@ -125,10 +125,8 @@ fn image_text<'a>(image: &Image, signals: impl Iterator<Item = &'a NamedSignal>)
 }
 
 fn signal(by: Option<Member>, place: SignalPlace, members: &Members) -> Option<&NamedSignal> {
-    let Some(Member::RemoteIo(program)) = by else {
-        return None;
-    };
-    members.signal(program, place)
+    // Either remote I/O of a program has its signals.
+    members.signal(by?.sampled_program()?, place)
 }
 
 fn place_text(by: Option<Member>, place: SignalPlace, members: &Members) -> String {
