@@ -18,8 +18,8 @@ use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Audience, Configurations, Field, Frame, Header, Image, Member, ProgramId, ProgramSet,
-    StationId, StationSet, Time, Write,
+    Audience, Configurations, Field, Frame, Header, Member, ProgramId, ProgramSet, StationId,
+    StationSet, Time, Write,
 };
 
 use crate::disk::Disks;
@@ -479,15 +479,6 @@ impl Simulation {
                 Output::Answer(_) | Output::Obeyed(_) => {}
             }
         }
-    }
-
-    fn drive_plant(&mut self, program: ProgramId, outputs: &Image, observe: &mut Observe<'_>) {
-        self.plants.drive(program, outputs);
-        if let Some(field) = self.plants.field(program) {
-            let plant = Member::Plant(program);
-            observe(self.now, self.pace.cycle(), plant, Record::Plant(field));
-        }
-        self.show_field(program);
     }
 
     fn send(&mut self, frame: Arc<Frame>) {

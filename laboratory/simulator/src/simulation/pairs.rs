@@ -100,6 +100,20 @@ impl Simulation {
         self.remote_io_slot(member)?.machine()?.poll_output()
     }
 
+    pub(super) fn drive_plant(
+        &mut self,
+        program: ProgramId,
+        outputs: &Image,
+        observe: &mut Observe<'_>,
+    ) {
+        self.plants.drive(program, outputs);
+        if let Some(field) = self.plants.field(program) {
+            let plant = Member::Plant(program);
+            observe(self.now, self.pace.cycle(), plant, Record::Plant(field));
+        }
+        self.show_field(program);
+    }
+
     /// Modules next to those of the author drive what the author has driven lately, or nothing.
     pub(super) fn follow(
         &mut self,
