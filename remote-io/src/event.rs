@@ -360,6 +360,29 @@ pub enum Event {
         /// Current cycle.
         moment: Moment,
     },
+    /// The modules of the two remote I/Os show different values of an input for too long: the value on which they agreed last is sampled.
+    InputsDiffer {
+        /// Current cycle.
+        moment: Moment,
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+    },
+    /// A module of an input does not count until the operator releases it: the other one has moved while the two differed.
+    InputExcluded {
+        /// Current cycle.
+        moment: Moment,
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+        /// The remote I/O whose module it is.
+        at: Member,
+    },
+    /// The modules of an input agree again, or the operator has released the one that was excluded.
+    InputsAgree {
+        /// Current cycle.
+        moment: Moment,
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+    },
     /// The other remote I/O of the program reports that it is the author, as this one was until now.
     SecondAuthor {
         /// Current cycle.

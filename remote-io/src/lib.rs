@@ -9,6 +9,7 @@ mod event;
 mod foresight;
 mod history;
 mod holders;
+mod paired_inputs;
 mod ramp;
 mod remote_io;
 mod selection;
@@ -21,9 +22,13 @@ pub use channel::Channel;
 pub use diagnosis::Diagnosis;
 pub use event::{Event, Lacking, LackingReason, Missing};
 pub use foresight::Foreseen;
+pub use paired_inputs::PairedInput;
 pub use ramp::Ramp;
 pub use remote_io::RemoteIo;
-pub use settings::{PairSettings, Release, Restart, Settings, StaleState, StopPoints, ValueFault};
+pub use settings::{
+    PairSettings, Release, Restart, SWITCHOVER, Settings, StaleState, StopPoints, ValueFault,
+    Wiring,
+};
 pub use source::{
     OperatorInput, OperatorInputKind, PointPlace, SignalInput, SignalSource, ValueMismatch,
     in_order,

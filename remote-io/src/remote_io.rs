@@ -189,7 +189,7 @@ impl RemoteIo {
         let mut member = Participant::new(own, agreement);
         member.clock.start(now);
         let holders = Holders::new(settings.program, agreement);
-        let pairing = settings.pair.map(|pair| Pairing::new(now, pair, holders.stations()));
+        let pairing = Pairing::new(now, &settings, holders.stations());
         let mut remote_io = Self {
             member,
             holders,
@@ -324,6 +324,7 @@ impl RemoteIo {
         }
         self.knowledge.pardon();
         self.diagnosing.release();
+        self.release_inputs();
         if self.program == Execution::Stopped {
             self.program = Execution::Restarting;
             self.report(Event::Released { moment });

@@ -8,6 +8,7 @@ use understudy_wire::{Image, ProgramHash, ProgramId};
 
 use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;
+use crate::paired_inputs::PairedInput;
 use crate::ramp::Ramp;
 use crate::source::{OperatorInput, PointPlace, SignalInput, SignalSource};
 
@@ -54,6 +55,8 @@ pub struct Settings {
     pub restart: Option<Restart>,
     /// Where the program has a second remote I/O.
     pub pair: Option<PairSettings>,
+    /// Inputs that modules of both remote I/Os read; of no importance where only the author is wired to the plant.
+    pub paired_inputs: Vec<PairedInput>,
 }
 
 /// Configuration of one of two remote I/Os of a program.
@@ -63,6 +66,37 @@ pub struct PairSettings {
     pub is_twin: bool,
     /// Cycles without the author after which the other one takes over: at least 1.
     pub take_over_after: u32,
+    /// How the two are wired to the plant.
+    pub wiring: Wiring,
+}
+
+impl PairSettings {
+    /// The first of two remote I/Os at one device, to which the author only connects.
+    pub fn exclusive(take_over_after: u32) -> Self {
+        Self { is_twin: false, take_over_after, wiring: Wiring::Exclusive }
+    }
+
+    /// Periods for which modules drive outputs that are not renewed: of a remote I/O that does not receive the author, and by their own watchdogs. As long
+    /// as a switchover may take, and one more.
+    pub fn lasting(&self) -> u32 {
+        self.take_over_after.saturating_add(SWITCHOVER + 1)
+    }
+}
+
+/// Cycles of a switchover after `take_over_after`: the one in which the other remote I/O begins, and one until it may.
+pub const SWITCHOVER: u32 = 2;
+
+/// How the two remote I/Os of a program are wired to the plant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Wiring {
+    /// Both reach one device, and the author only connects to it.
+    Exclusive,
+    /// Each has modules of its own. Two input modules read each sensor, and two output modules drive each actuator through diodes: it is on where one of
+    /// them drives it.
+    Parallel {
+        /// Samples in a row in which two readings of an input differ until an operator is told: at least 1.
+        discrepancy_cycles: u32,
+    },
 }
 
 impl Settings {

@@ -230,6 +230,7 @@ impl Pairs {
                             account.differing += u64::from(deadline.differ);
                         }
                         Output::Retain(_)
+                        | Output::Follow(_)
                         | Output::Connect(_)
                         | Output::Answer(_)
                         | Output::Obeyed(_) => {}
@@ -251,6 +252,7 @@ impl Pairs {
                         }
                         Output::Report(Event::SteppedDown)
                         | Output::Drive { .. }
+                        | Output::Follow(_)
                         | Output::Connect(_)
                         | Output::Answer(_)
                         | Output::Obeyed(_)

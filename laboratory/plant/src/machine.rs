@@ -51,6 +51,9 @@ pub struct Settings {
     pub fail_safe: Image,
     /// Periods without an actuation until the watchdog runs out: at least 2.
     pub watchdog_cycles: u32,
+    /// Whether two remote I/Os drive it by modules of their own, through diodes: an actuator is on where one of the two modules drives it, and each has
+    /// a watchdog.
+    pub has_two_modules: bool,
 }
 
 /// A plant between its remote I/O and its neighbours.
@@ -59,6 +62,8 @@ pub struct PlantMachine {
     settings: Settings,
     /// The last actuation: time of arrival, moment and outputs.
     driven: Option<Driven>,
+    /// The last one of each of two modules.
+    modules: [Option<Driven>; 2],
     wakeup: Time,
     feed: Feed,
     /// State of each followed terminal, by number.
@@ -105,6 +110,7 @@ impl PlantMachine {
     pub fn new(settings: Settings, now: Time) -> Self {
         Self {
             driven: None,
+            modules: [None, None],
             wakeup: now,
             feed: Feed::default(),
             hearings: vec![Hearing::default(); settings.follows.len()],
@@ -165,13 +171,49 @@ impl PlantMachine {
         let newer = |driven: &Driven| {
             moment > driven.moment || (driven.alone && moment.epoch != driven.moment.epoch)
         };
-        if !self.driven.as_ref().is_none_or(newer) && !self.watchdog_has_run_out(now) {
-            return;
+        let is_new = self.driven.as_ref().is_none_or(newer) || self.watchdog_has_run_out(now);
+        let driven = Driven { at: now, moment, alone: header.alone, outputs: outputs.clone() };
+        if self.settings.has_two_modules {
+            self.drive_module(header.sender, &driven);
         }
-        self.driven =
-            Some(Driven { at: now, moment, alone: header.alone, outputs: outputs.clone() });
-        self.wakeup = now + self.period() * 3 / 2;
-        self.step(moment, outputs.clone(), Pace::Driven);
+        if is_new {
+            self.driven = Some(driven);
+            self.wakeup = now + self.period() * 3 / 2;
+            let outputs = self.outputs(now);
+            self.step(moment, outputs, Pace::Driven);
+        }
+    }
+
+    /// One module drives other outputs, unless they are older than those that it drives; in one cycle the later frame counts.
+    fn drive_module(&mut self, sender: Member, driven: &Driven) {
+        let limit = self.period() * self.settings.watchdog_cycles;
+        let module = &mut self.modules[usize::from(matches!(sender, Member::Twin(_)))];
+        let is_older = module.as_ref().is_some_and(|before| {
+            let lasts = driven.at.since(before.at) < limit;
+            lasts && before.moment.epoch == driven.moment.epoch && driven.moment < before.moment
+        });
+        if !is_older {
+            *module = Some(driven.clone());
+        }
+    }
+
+    /// y(i) as the actuators have it.
+    fn outputs(&self, now: Time) -> Image {
+        let Some(driven) = &self.driven else {
+            return self.settings.fail_safe.clone();
+        };
+        if !self.settings.has_two_modules {
+            return driven.outputs.clone();
+        }
+        let limit = self.period() * self.settings.watchdog_cycles;
+        let mut outputs = Image::zero(self.settings.fail_safe.width());
+        let lasting = self.modules.iter().flatten().filter(|it| now.since(it.at) < limit);
+        for module in lasting {
+            for (word, more) in outputs.words_mut().iter_mut().zip(module.outputs.words()) {
+                *word |= more;
+            }
+        }
+        outputs
     }
 
     fn wake(&mut self, now: Time) {
@@ -188,7 +230,8 @@ impl PlantMachine {
         if watchdog {
             self.step(moment, self.settings.fail_safe.clone(), Pace::Watchdog);
         } else {
-            self.step(moment, driven.outputs.clone(), Pace::Alone);
+            let outputs = self.outputs(now);
+            self.step(moment, outputs, Pace::Alone);
         }
     }
 

@@ -104,6 +104,7 @@ fn machine() -> PlantMachine {
             follows: vec![Followed { from: PILOT, sensor: 2, bits: 1 }],
             fail_safe: Image::zero(1),
             watchdog_cycles: WATCHDOG_CYCLES,
+            has_two_modules: false,
         },
         Time(0),
     )

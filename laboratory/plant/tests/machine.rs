@@ -30,6 +30,10 @@ fn controller() -> Circuit {
 }
 
 fn machine() -> PlantMachine {
+    machine_with(false)
+}
+
+fn machine_with(has_two_modules: bool) -> PlantMachine {
     let agreement = Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
@@ -52,6 +56,7 @@ fn machine() -> PlantMachine {
             follows: Vec::new(),
             fail_safe: Image::from_bits([false, true]),
             watchdog_cycles: WATCHDOG_CYCLES,
+            has_two_modules,
         },
         Time(0),
     )
@@ -313,4 +318,56 @@ fn events_are_read_back_as_they_were_written() {
     let text = serde_json::to_string(&event).expect("it is plain data");
     assert!(text.starts_with(r#"{"event":"stepped""#), "{text}");
     assert_eq!(serde_json::from_str::<Event>(&text).expect("the same"), event);
+}
+
+/// An actuation of one of two remote I/Os, and what the actuators get then.
+fn drive(
+    machine: &mut PlantMachine,
+    now: Time,
+    cycle: u64,
+    sender: Member,
+    bits: [bool; 2],
+) -> Vec<[bool; 2]> {
+    let outputs = Image::from_bits(bits);
+    let frame = frame(at(cycle), sender, Body::Actuation(Actuation { outputs }));
+    machine.handle_input(now, Input::Frame(&frame));
+    stepped(machine)
+}
+
+fn stepped(machine: &mut PlantMachine) -> Vec<[bool; 2]> {
+    let outputs = std::iter::from_fn(|| machine.poll_output());
+    let steps = outputs.filter_map(|output| match output {
+        Output::Report(Event::Stepped { outputs, .. }) => Some([outputs.get(0), outputs.get(1)]),
+        _ => None,
+    });
+    steps.collect()
+}
+
+/// An actuator is on where one of two modules drives it; a module without an actuation for `watchdog_cycles` drives nothing.
+#[test]
+fn two_modules_drive_one_actuator_through_diodes() {
+    let (first, twin) = (Member::RemoteIo(PRESS), Member::Twin(PRESS));
+    let mut machine = machine_with(true);
+    let [on, off] = [[true, false], [false, false]];
+    assert_eq!(drive(&mut machine, periods(1), 1, first, on), [on]);
+    assert_eq!(drive(&mut machine, periods(1), 1, twin, on).len(), 0, "one step in a cycle");
+    // One of them is a cycle late.
+    assert_eq!(drive(&mut machine, periods(2), 2, first, off), [on]);
+    assert!(drive(&mut machine, periods(2), 2, twin, off).is_empty());
+    assert_eq!(drive(&mut machine, periods(3), 3, first, on), [on]);
+    // An older frame counts no more.
+    assert_eq!(drive(&mut machine, periods(4), 4, twin, off), [on]);
+    assert!(drive(&mut machine, periods(4), 3, twin, on).is_empty());
+    // The first one has ended: its module drives for `watchdog_cycles` periods, and the other one alone after that.
+    assert_eq!(drive(&mut machine, periods(5), 5, twin, off), [on]);
+    assert_eq!(drive(&mut machine, periods(6), 6, twin, off), [off]);
+    assert_eq!(drive(&mut machine, periods(7), 7, twin, on), [on]);
+    // Both have.
+    let mut last = Vec::new();
+    while machine.wakeup() <= periods(12) {
+        machine.handle_input(machine.wakeup(), Input::Wakeup);
+        last.extend(stepped(&mut machine));
+    }
+    // What is configured; of two modules it is 0, which the cluster file sees to.
+    assert_eq!((last.first(), last.last()), (Some(&on), Some(&[false, true])), "{last:?}");
 }

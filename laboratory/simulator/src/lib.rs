@@ -8,6 +8,7 @@ mod disk;
 mod fault;
 mod field;
 mod links;
+mod modules;
 mod network;
 mod pace;
 mod parts;

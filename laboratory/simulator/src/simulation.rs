@@ -26,6 +26,7 @@ use crate::disk::Disks;
 use crate::fault::Fault;
 use crate::field::Plants;
 use crate::links::{Links, Metered};
+use crate::modules::Modules;
 use crate::network::{Disturbance, Network};
 use crate::pace::{Pace, founds};
 use crate::parts::Parts;
@@ -85,6 +86,8 @@ pub struct Simulation {
     driven_by: Vec<Option<(Member, Time)>>,
     wakeups: Wakeups,
     plants: Plants,
+    /// For each program, the modules between its remote I/Os and its plant.
+    modules: Vec<Modules>,
     disks: Disks,
     referees: Vec<Referee>,
     signals: SignalReferee,
@@ -168,6 +171,11 @@ impl Simulation {
             remote_ios,
             twins,
             plants: Plants::new(&parts),
+            modules: parts
+                .remote_ios
+                .iter()
+                .map(|settings| Modules::new(settings.pair, settings.agreement.schedule.period()))
+                .collect(),
             disks,
             referees,
             signals: SignalReferee::new(&parts.remote_ios),
@@ -437,6 +445,7 @@ impl Simulation {
                 }
                 Output::Retain(record) => self.disks.write(member, record),
                 Output::Drive { .. }
+                | Output::Follow(_)
                 | Output::Connect(_)
                 | Output::Answer(_)
                 | Output::Obeyed(_) => {}
@@ -454,13 +463,11 @@ impl Simulation {
                 Output::Send(frame) => self.send(frame),
                 Output::Drive { outputs, .. } => {
                     self.note_driver(member, program, observe);
-                    self.plants.drive(program, &outputs);
-                    if let Some(field) = self.plants.field(program) {
-                        let plant = Member::Plant(program);
-                        observe(self.now, self.pace.cycle(), plant, Record::Plant(field));
-                    }
-                    self.show_field(program);
+                    let now = self.now;
+                    let outputs = self.modules[program.index()].drive(now, member, &outputs);
+                    self.drive_plant(program, &outputs, observe);
                 }
+                Output::Follow(outputs) => self.follow(member, program, &outputs, observe),
                 Output::Connect(true) => self.show_field(program),
                 Output::Connect(false) => {}
                 Output::Report(event) => {

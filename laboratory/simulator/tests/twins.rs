@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use understudy_cycle::Mode;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
-use understudy_wire::{Member, ProgramId, StationId, Time};
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId, Time};
 
 const ROBOT: ProgramId = ProgramId(0);
 const FIRST: Member = Member::RemoteIo(ROBOT);
@@ -137,4 +137,49 @@ fn a_cut_between_the_two_changes_nothing() {
     let outcome = run(parts(1), &faults, 200);
     assert_eq!((outcome.gap, outcome.missed), (0, 0));
     assert_eq!(outcome.simulation.author(ROBOT), Some(FIRST));
+}
+
+/// The author and a station are lost at one time. A station that does not compute the program changes nothing; one that does may have followed the author
+/// longer than any other one, so the operator is asked, nothing is driven meanwhile, and the program goes on when he has answered.
+#[test]
+fn the_author_and_a_station_at_once() {
+    for wire in [press_cell::pair, press_cell::pair_parallel] {
+        for (station, asks) in [(0, true), (1, false), (2, true)] {
+            for tenth in 0..10 {
+                let phase = f64::from(tenth) / 10.0;
+                let mut parts = press_cell::parts(Mode::Full, 1);
+                wire(&mut parts, 1);
+                let lost = [FIRST, Member::Station(StationId(station))];
+                let faults = lost.map(|member| fault(100, phase, member, Action::Crash));
+                let mut simulation = run(parts, &faults, 250).simulation;
+                assert_eq!(simulation.asking().contains(ROBOT), asks, "{station} {phase}");
+                assert_eq!(simulation.author(ROBOT).is_none(), asks, "{station} {phase}");
+                simulation.let_operator_choose();
+                simulation.go_to(350, 0.0, &mut |_, _, _, _| {});
+                assert_eq!(simulation.author(ROBOT), Some(TWIN), "{station} {phase}");
+                assert_eq!(simulation.violations(), [], "{station} {phase}");
+            }
+        }
+    }
+}
+
+/// The same, and the station is back before an operator has answered: it may have lost what it had followed, so the question stays.
+#[test]
+fn the_station_that_was_lost_with_the_author_answers_nothing() {
+    let station = Member::Station(StationId(0));
+    let faults = [
+        fault(100, 0.3, FIRST, Action::Crash),
+        fault(100, 0.3, station, Action::Crash),
+        fault(150, 0.3, station, Action::Restart),
+    ];
+    let simulation = run(parts(1), &faults, 400).simulation;
+    assert!(simulation.asking().contains(ROBOT));
+    // One that was only suspended has all that it followed.
+    let faults = [
+        fault(100, 0.3, FIRST, Action::Crash),
+        fault(100, 0.3, station, Action::Stop),
+        fault(150, 0.3, station, Action::Continue),
+    ];
+    let simulation = run(parts(1), &faults, 400).simulation;
+    assert_eq!((simulation.asking(), simulation.author(ROBOT)), (ProgramSet::EMPTY, Some(TWIN)));
 }

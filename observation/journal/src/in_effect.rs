@@ -207,6 +207,12 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
             (None, "author", format!("{program:?}"))
         }
         RemoteIo::PartnerLost { .. } => of("partner"),
+        RemoteIo::InputsDiffer { input, .. } | RemoteIo::InputExcluded { input, .. } => {
+            about("input-modules", input)
+        }
+        RemoteIo::InputsAgree { input, .. } => {
+            return Some(Effect::Ends(about("input-modules", input)));
+        }
         RemoteIo::PartnerReceived { .. } => return Some(Effect::Ends(of("partner"))),
         _ => return None,
     };

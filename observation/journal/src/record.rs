@@ -228,6 +228,9 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::PartnerLost { moment }
             | RemoteIo::PartnerReceived { moment }
             | RemoteIo::SecondAuthor { moment }
+            | RemoteIo::InputsDiffer { moment, .. }
+            | RemoteIo::InputExcluded { moment, .. }
+            | RemoteIo::InputsAgree { moment, .. }
             | RemoteIo::Stalled { moment, .. } => Some(*moment),
             RemoteIo::StartedCold { born, .. } | RemoteIo::StartedWarm { born, .. } => Some(*born),
             RemoteIo::Refused { .. }

@@ -11,7 +11,7 @@ use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, Source, Stati
 use crate::event::Level;
 pub(crate) use members::odd_configuration_text;
 pub(crate) use processes::fault_text;
-pub(crate) use signals::{Writes, force_text};
+pub(crate) use signals::{Writes, force_text, modules_text};
 
 /// A table of descriptions: each kind of event with its name, its level and its text. It makes the function that describes an event,
 /// and the list of the names.

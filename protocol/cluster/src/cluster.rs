@@ -20,7 +20,9 @@ use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{Diagnosis, Ramp, Release, Restart, StaleState, StopPoints, ValueFault};
+use understudy_remote_io::{
+    Diagnosis, PairedInput, Ramp, Release, Restart, StaleState, StopPoints, ValueFault, Wiring,
+};
 use understudy_typed::{Points, Program as TypedProgram};
 use understudy_wire::{Image, Member, ProgramHash, ProgramId, ProgramSet, Roster, StationId};
 
@@ -168,15 +170,28 @@ pub struct RemoteIo {
     pub addresses: Addresses,
 }
 
-/// The second remote I/O of a program, at one device with the first one, of which one at a time may write.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// The second remote I/O of a program.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Twin {
     /// Its name.
     pub name: String,
     /// Cycles without the author after which the other one takes over.
     pub take_over_after: u32,
+    /// How the two are wired to the plant.
+    pub wiring: Wiring,
+    /// Inputs that modules of both read.
+    pub paired_inputs: Vec<PairedInput>,
+    /// The device of its own modules; none where the first one has none, or both are at one device.
+    pub field: Option<FieldDevice>,
     /// Where it listens, if the file says so.
     pub addresses: Addresses,
+}
+
+impl Twin {
+    /// Whether both remote I/Os of its program have modules of their own.
+    pub fn is_parallel(&self) -> bool {
+        matches!(self.wiring, Wiring::Parallel { .. })
+    }
 }
 
 impl RemoteIo {

@@ -6,6 +6,7 @@ use std::fmt::Write;
 
 use understudy_cycle::{Mode, Turns};
 use understudy_plant::{Followed, ModelKind, Signals};
+use understudy_remote_io::Wiring;
 use understudy_wire::ProgramId;
 
 use crate::canonical::circuit_text;
@@ -65,7 +66,16 @@ pub(crate) fn configuration_text(
         }
         if let Some(twin) = &remote_io.twin {
             let after = twin.take_over_after;
-            line(format_args!("  twin {} exclusive {after}", twin.name));
+            match twin.wiring {
+                Wiring::Exclusive => line(format_args!("  twin {} exclusive {after}", twin.name)),
+                Wiring::Parallel { discrepancy_cycles: cycles } => {
+                    line(format_args!("  twin {} parallel {after} {cycles}", twin.name));
+                }
+            }
+            for input in twin.paired_inputs.iter().filter(|input| input.tolerance > 0.0) {
+                let (bit, tolerance) = (input.place.bit, input.tolerance.to_bits());
+                line(format_args!("  tolerance {bit} {tolerance:016x}"));
+            }
         }
         for source in &remote_io.inputs {
             line(format_args!("  input {}", source_text(source)));

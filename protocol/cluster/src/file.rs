@@ -118,6 +118,13 @@ pub(crate) struct TwinSection {
     pub(crate) name: Option<Placed<String>>,
     pub(crate) take_over_after: u32,
     pub(crate) owner_timeout: Duration,
+    pub(crate) is_parallel: bool,
+    /// The device of a twin with modules of its own.
+    pub(crate) connection: Option<ConnectionText>,
+    pub(crate) discrepancy_cycles: u32,
+    pub(crate) tolerance: Vec<(Placed<String>, Constant)>,
+    /// Keys that only one of the wirings has, with their places.
+    pub(crate) special: Vec<Placed<&'static str>>,
     pub(crate) addresses: Addresses<Placed<SocketAddr>>,
 }
 
@@ -339,9 +346,19 @@ fn twin<'a, 't>(
         return None;
     }
     let fields = fields.table("twin", &TWIN, empty, diagnostics);
-    // `exclusive` is the only wiring; another word is reported.
-    fields.word("wiring", diagnostics);
+    let special = ["owner_timeout", "modbus", "discrepancy_cycles", "tolerance"];
+    let special = special.into_iter();
     Some(TwinSection {
+        is_parallel: fields.word("wiring", diagnostics) == 1,
+        connection: fields
+            .has("modbus")
+            .then(|| fields.connection("modbus", diagnostics))
+            .flatten(),
+        discrepancy_cycles: fields.count("discrepancy_cycles", diagnostics),
+        tolerance: fields.values("tolerance", diagnostics),
+        special: special
+            .filter_map(|value| Some(Placed { value, span: fields.place_of(value)? }))
+            .collect(),
         span: fields.span.clone(),
         name: fields.name("name", diagnostics),
         take_over_after: fields.count("take_over_after", diagnostics),

@@ -112,8 +112,11 @@ pub(crate) const MODES: [&str; 2] = ["full", "paper"];
 pub(crate) const SCHEDULES: [&str; 2] = ["token", "parallel"];
 pub(crate) const LINKS: [&str; 2] = ["udp", "zenoh"];
 pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
+/// Samples in which the readings of two modules may differ, unless configured otherwise: more than the bounce of a contact in a cycle of 10 ms.
+const DISCREPANCY_CYCLES: u32 = 20;
+
 /// How the two remote I/Os of a program are connected to the plant.
-pub(crate) const WIRINGS: [&str; 1] = ["exclusive"];
+pub(crate) const WIRINGS: [&str; 2] = ["exclusive", "parallel"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
@@ -200,9 +203,12 @@ pub(crate) static TWIN: Section = Section {
     meaning: "a second remote I/O of the same program, on another machine, below its `[[remote_io]]`",
     keys: keys! {
         required name: Kind::Name, "names it";
-        required wiring: Kind::Word { words: &WIRINGS, default: false }, "how the two are connected to the plant: `exclusive`, both reach one device that lets one of them write at a time, and only the author connects to it";
+        required wiring: Kind::Word { words: &WIRINGS, default: false }, "how the two are connected to the plant: `exclusive`, both reach one device that lets one of them write at a time, and only the author connects to it; `parallel`, each has modules of its own, which read the same sensors and drive the same actuators through diodes";
         key take_over_after: count(1, 100, 1), "cycles without the author after which the other one takes over";
-        key owner_timeout: time(Duration::ZERO, Duration::from_secs(60), Duration::ZERO), "time for which the device keeps a connection that has failed and lets no other one write; it must be over when the other one takes over";
+        key owner_timeout: time(Duration::ZERO, Duration::from_secs(60), Duration::ZERO), "time for which the device keeps a connection that has failed and lets no other one write; it must be over when the other one takes over; of `exclusive`";
+        key modbus: Kind::Connection, "the device with the modules of the twin, with the places of `[remote_io.field]`; of `parallel`";
+        key discrepancy_cycles: count(2, MANY_CYCLES, DISCREPANCY_CYCLES), "samples in a row in which the two readings of an input may differ before an alarm is raised; of `parallel`";
+        key tolerance: Kind::Values, "greatest difference of two readings of a number that agree, by the name of the input, such as `{ level = 0.5 }`; 0 for all others; of `parallel`";
         key address: Kind::Address, "as for a controller";
         key second_address: Kind::Address, "as for a controller";
     },

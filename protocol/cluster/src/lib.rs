@@ -41,7 +41,7 @@ pub use change::{
     ChangeError, ChangeTexts, ChangedInitial, ChangedText, NeedsStop, OnlineChanges, ProgramText,
     Unfit, changed_initials, fates,
 };
-pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
+pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Twin, Understudy};
 pub use code::{Code, Unnamed};
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};

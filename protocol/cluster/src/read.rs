@@ -353,7 +353,7 @@ fn remote_ios(
         let fail_safe = fail_safe::values(member, &section.fail_safe, diagnostics);
         let ramps = fail_safe::ramps(member, &section.ramp, period, diagnostics);
         let name = section.name.map(|name| name.value);
-        let remote_io = RemoteIo {
+        let mut remote_io = RemoteIo {
             name: name.unwrap_or_else(|| {
                 let name = default_remote_io_name(member);
                 names.declare(&name, controller.span.clone(), diagnostics);
@@ -382,11 +382,14 @@ fn remote_ios(
                 .diagnosis
                 .as_ref()
                 .and_then(|file| diagnosis::read(file, period, member, ladders, diagnostics)),
-            twin: section.twin.and_then(|twin| {
-                twins::read(twin, section.field.as_ref(), period, names, diagnostics)
-            }),
+            twin: None,
             addresses: section.addresses.map(|address| address.value),
         };
+        if let Some(twin) = section.twin {
+            let of = (&remote_io, member);
+            remote_io.twin =
+                twins::read(twin, of, section.field.as_ref(), period, names, diagnostics);
+        }
         places.insert(index, remote_io);
     }
     let place = |(index, member): (usize, &Member)| {

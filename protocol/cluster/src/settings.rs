@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use understudy_cycle::Mode;
 use understudy_remote_io::{PairSettings, PointPlace, SignalSource};
-use understudy_wire::{Member, Moment, ProgramId, StationId};
+use understudy_wire::{Image, Member, Moment, ProgramId, StationId};
 
-use crate::cluster::{Cluster, RemoteIo};
+use crate::cluster::{Cluster, RemoteIo, Twin};
 use crate::undriven::initial_image;
 
 impl Cluster {
@@ -71,10 +71,14 @@ impl Cluster {
                 .executable
                 .is_retentive()
                 .then_some(remote_io.restart),
-            pair: remote_io
+            pair: remote_io.twin.as_ref().map(|twin| PairSettings {
+                wiring: twin.wiring,
+                ..PairSettings::exclusive(twin.take_over_after)
+            }),
+            paired_inputs: remote_io
                 .twin
                 .as_ref()
-                .map(|twin| PairSettings { is_twin: false, take_over_after: twin.take_over_after }),
+                .map_or_else(Vec::new, |twin| twin.paired_inputs.clone()),
         })
     }
 
@@ -103,14 +107,22 @@ impl Cluster {
     /// What a plant is told when it starts; nothing where the program has no simulated plant.
     pub fn plant_settings(&self, program: ProgramId) -> Option<understudy_plant::Settings> {
         let place = self.plants.get(program.index())?.as_ref()?;
+        let remote_io = &self.remote_ios[program.index()];
+        let has_two_modules = remote_io.twin.as_ref().is_some_and(Twin::is_parallel);
+        let fail_safe = &remote_io.fail_safe;
         Some(understudy_plant::Settings {
             program,
             agreement: Arc::clone(&self.agreement),
             plant: place.plant.clone(),
             fed_by: place.fed_by,
             follows: place.follows.clone(),
-            fail_safe: self.remote_ios[program.index()].fail_safe.clone(),
+            // Modules that are not driven are released.
+            fail_safe: match has_two_modules {
+                true => Image::zero(fail_safe.width()),
+                false => fail_safe.clone(),
+            },
             watchdog_cycles: place.watchdog_cycles,
+            has_two_modules,
         })
     }
 }

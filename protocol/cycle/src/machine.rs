@@ -58,6 +58,9 @@ pub enum Output<Event> {
         /// When the sample was taken that they are proved for; none where they are held or fail-safe.
         sampled: Option<Time>,
     },
+    /// Outputs that the modules of a remote I/O drive next to those of the author, which drives the same: what the author has sent, or 0 where they are
+    /// released.
+    Follow(Image),
     /// Whether the remote I/O is to be connected to its field; one that has no second one is from its start on.
     Connect(bool),
     /// An event for the journal.

@@ -361,7 +361,7 @@ pub struct Actuation {
 }
 
 /// What one of two remote I/Os of a program reports to the other one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Pair {
     /// Its part.
     pub part: Part,
@@ -374,13 +374,36 @@ pub struct Pair {
     /// The newest [`Self::sent`] of the other one by which this one is bound: it does not become the author for `take_over_after` deadlines after
     /// it received that frame. `None` where it is not bound.
     pub bound_by: Option<Time>,
+    /// Values of the modules, where both remote I/Os are wired to the plant; `None` where only the author is.
+    pub modules: Option<Modules>,
+}
+
+/// What one of two remote I/Os that are both wired to the plant sends to the other one.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Modules {
+    /// The author.
+    Author {
+        /// Outputs that its modules drive from the deadline of this cycle on; `None` in any other frame than the one of a deadline.
+        outputs: Option<Image>,
+        /// [`Pair::sent`] of the newest frame of the other one: the outputs were sent later.
+        answers: Option<Time>,
+        /// Inputs, by their first bits, whose module is excluded: at the first remote I/O, and at the twin.
+        excluded: [Image; 2],
+    },
+    /// The other one.
+    Follower {
+        /// Inputs as its modules show them; `None` where its field does not answer.
+        inputs: Option<Image>,
+        /// Whether its modules drive the outputs of the author.
+        follows: bool,
+    },
 }
 
 /// The part of one of two remote I/Os of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
-    /// It samples nothing and drives nothing.
+    /// It takes no samples. Its modules are not driven, or drive the outputs of the author where both remote I/Os are wired to the plant.
     Follower,
     /// It connects to its field, and samples nothing and drives nothing yet.
     TakingOver,

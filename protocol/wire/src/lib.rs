@@ -28,7 +28,7 @@ pub use force::{
 };
 pub use frame::{
     Actuation, Body, Configurations, Field, Frame, Header, Holding, Join, Kept,
-    MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Pair, Part, Partial, Recalled, Relayed, Sample,
+    MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Modules, Pair, Part, Partial, Recalled, Relayed, Sample,
     SamplesReceived, Source, Step, Transfer, Turn, Word,
 };
 pub use identifier::{

@@ -28,7 +28,7 @@ impl RemoteIo {
         let mut accusation = None;
         let (selection, sampled) = match self.knowledge.run() {
             None => (Selection::Missing(Missing::NoHistory), None),
-            Some(Run { sampled: false, .. }) if self.sensors.is_none() => {
+            Some(Run { sampled: false, .. }) if !self.is_sensed() => {
                 (Selection::Missing(Missing::BadQuality), None)
             }
             Some(Run { sampled: false, .. }) => (Selection::Missing(Missing::NoCycle), None),
@@ -189,6 +189,7 @@ impl RemoteIo {
         if let Some(stop) = self.settings.stop {
             driven.set(stop.stopped, self.program != Execution::Running);
         }
+        self.note_driven(&driven);
         self.member.put(Output::Drive {
             outputs: driven.clone(),
             sampled: missing.is_none().then_some(self.sampled_at),

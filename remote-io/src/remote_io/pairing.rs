@@ -20,6 +20,7 @@
 //! (`recovery.rs`): an author that ends to be one forgets its history, but not what it has applied.
 
 mod exchange;
+mod modules;
 mod take_over;
 
 use std::time::Duration;
@@ -28,13 +29,15 @@ use smallvec::SmallVec;
 use understudy_cycle::Output;
 use understudy_wire::{Moment, Pair, Part, Sample, StationId, StationSet, Time};
 
+use modules::Modules;
+
 use super::knowledge::Knowledge;
 use super::protection::Protection;
 use super::writing::Writing;
 use super::{Execution, RemoteIo};
 use crate::diagnosis::Diagnosing;
 use crate::event::Event;
-use crate::settings::PairSettings;
+use crate::settings::{PairSettings, Settings};
 use crate::trust::Trust;
 
 /// Frames to the other one whose answer counts: those of a few deadlines.
@@ -92,6 +95,8 @@ pub(super) struct Pairing {
     refused: u32,
     /// Whether a station that can hold the state was received in the cycle of the last deadline.
     receives_stations: bool,
+    /// Where both remote I/Os are wired to the plant.
+    modules: Option<Modules>,
 }
 
 /// Whether the other remote I/O is received.
@@ -140,11 +145,12 @@ impl Report {
 impl Pairing {
     pub(super) fn new(
         now: Time,
-        settings: PairSettings,
+        of: &Settings,
         stations: impl Iterator<Item = StationId>,
-    ) -> Self {
+    ) -> Option<Self> {
+        let settings = of.pair?;
         let report = |station| Report { station, lacks: None, lacked_for: 0, stepped: None };
-        Self {
+        Some(Self {
             settings,
             part: Part::Follower,
             able: true,
@@ -165,7 +171,8 @@ impl Pairing {
             theirs: None,
             refused: 0,
             receives_stations: false,
-        }
+            modules: Modules::of(of),
+        })
     }
 
     /// The newest applied sample that it knows of, of its own and of the other remote I/O.
@@ -287,6 +294,7 @@ impl RemoteIo {
             if slept {
                 pairing.wait(now);
                 self.follow_again(now);
+                self.release_modules();
             }
             return;
         }
@@ -338,12 +346,21 @@ impl RemoteIo {
         self.trust = Trust::default();
         self.differed.clear();
         self.give_up_field();
+        self.release_modules();
         self.report_part();
     }
 
     fn give_up_field(&mut self) {
-        self.sensors = None;
-        self.member.put(Output::Connect(false));
+        if !self.has_own_modules() {
+            self.sensors = None;
+            self.member.put(Output::Connect(false));
+        }
+    }
+
+    fn connect_field(&mut self) {
+        if !self.has_own_modules() {
+            self.member.put(Output::Connect(true));
+        }
     }
 
     fn report_part(&mut self) {
@@ -367,9 +384,10 @@ impl RemoteIo {
             _ => return,
         };
         if !was_connected {
-            self.member.put(Output::Connect(true));
+            self.connect_field();
         }
         self.report_part();
+        self.take_over_modules();
         self.send_pair();
     }
 

@@ -95,7 +95,7 @@ impl RemoteIo {
         };
         // A missing station that could hold the state gets longer: it may be the only one that does.
         let patience = if is_whole { 1 } else { 5 };
-        if waited < listen_cycles * patience || !self.may_begin(moment) || self.sensors.is_none() {
+        if waited < listen_cycles * patience || !self.may_begin(moment) || !self.is_sensed() {
             return;
         }
         if let Knowledge::Listening { unproved, .. } = &mut self.knowledge {

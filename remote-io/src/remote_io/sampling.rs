@@ -43,7 +43,7 @@ impl RemoteIo {
         if self.knowledge.run().is_none() || !self.may_sample() {
             return;
         }
-        let Some(sensors) = self.sensors.clone() else {
+        let Some(sensors) = self.read_field() else {
             return;
         };
         let moment = self.moment();

@@ -103,6 +103,7 @@ impl Bench {
             stale_state: StaleState::Operator,
             restart: None,
             pair: None,
+            paired_inputs: Vec::new(),
         };
         Self { remote_io: RemoteIo::new(Time(0), settings), cycle: 100 }
     }

@@ -54,6 +54,7 @@ pub(crate) fn settings(understudies: usize) -> Settings {
         stale_state: StaleState::Operator,
         restart: None,
         pair: None,
+        paired_inputs: Vec::new(),
     }
 }
 

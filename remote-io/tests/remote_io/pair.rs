@@ -11,7 +11,7 @@ use crate::bench::{Bench, PROGRAM, Said, held_after, recalled_of, sample_of, set
 
 /// The twin of a program with a controller and an understudy.
 fn twin(release: Release) -> Settings {
-    let pair = PairSettings { is_twin: true, take_over_after: 1 };
+    let pair = PairSettings { is_twin: true, ..PairSettings::exclusive(1) };
     Settings { pair: Some(pair), release, ..settings(1) }
 }
 

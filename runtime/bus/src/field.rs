@@ -88,10 +88,10 @@ impl SimulatedField {
         Self { own, program, agreement, configurations, has_plant: false, connected: true }
     }
 
-    /// Of `own`, one of two remote I/Os of the program: it is connected when it is told to.
+    /// Of `own`, one of two remote I/Os of the program: it is connected when it is told to, or from the start on where it has modules of its own.
     #[must_use]
-    pub fn of_pair(self, own: Member) -> Self {
-        Self { own, connected: false, ..self }
+    pub fn of_pair(self, own: Member, has_own_modules: bool) -> Self {
+        Self { own, connected: has_own_modules, ..self }
     }
 
     /// The cluster has a plant there, whose silence is reported.

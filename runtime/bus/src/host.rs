@@ -402,6 +402,12 @@ impl<M: Machine> Host<'_, M> {
                         round.timing.driven(sampled, self.clock.now());
                     }
                 }
+                Output::Follow(outputs) => {
+                    let age = self.clock.now().since(now);
+                    if let Some(frame) = self.field.drive(round.moment, &outputs, age) {
+                        self.say(&frame, round);
+                    }
+                }
                 Output::Connect(connects) => self.field.connect(connects),
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
                 Output::Retain(record) => {

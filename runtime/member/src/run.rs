@@ -11,13 +11,13 @@ use understudy_bus::{
     Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, Peer, Retention,
     SimulatedField, run_member,
 };
-use understudy_cluster::{Cluster, Link};
+use understudy_cluster::{Cluster, Link, Twin};
 use understudy_cycle::Machine;
 use understudy_journal::Segments;
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Member, Time};
+use understudy_wire::{Image, Member, Time};
 
 use crate::changes::{StartedChange, started_change};
 use crate::error::MemberError;
@@ -142,20 +142,29 @@ fn field_of(
     settings: &understudy_remote_io::Settings,
 ) -> Result<Box<dyn FieldDriver>, MemberError> {
     let (agreement, program) = (cluster.agreement(), settings.program);
-    let is_paired = settings.pair.is_some();
     let remote_io = cluster.remote_ios().get(program.index());
-    let Some(device) = remote_io.and_then(|remote_io| remote_io.field.clone()) else {
+    let twin = remote_io.and_then(|remote_io| remote_io.twin.as_ref());
+    let has_own_modules = twin.is_some_and(Twin::is_parallel);
+    let device = match (member, twin) {
+        (Member::Twin(_), Some(twin)) if has_own_modules => twin.field.clone(),
+        _ => remote_io.and_then(|remote_io| remote_io.field.clone()),
+    };
+    let Some(device) = device else {
         let field = SimulatedField::new(program, agreement.clone());
-        let field = if is_paired { field.of_pair(member) } else { field };
+        let field = if twin.is_some() { field.of_pair(member, has_own_modules) } else { field };
         let has_plant = cluster.member_name(Member::Plant(program)).is_some();
         return Ok(Box::new(if has_plant { field.with_plant() } else { field }));
     };
     let period = agreement.schedule.period();
-    let equipment = if is_paired {
+    let fail_safe = &settings.fail_safe;
+    let equipment = if has_own_modules {
+        // The modules of one that ends in order are released: those of the other one drive the outputs.
+        let released = Image::zero(fail_safe.width());
+        Equipment::start(device, released, period, options.real_time)
+    } else if twin.is_some() {
         Equipment::start_in_pair(device, period, options.real_time)
     } else {
-        let fail_safe = settings.fail_safe.clone();
-        Equipment::start(device, fail_safe, period, options.real_time)
+        Equipment::start(device, fail_safe.clone(), period, options.real_time)
     };
     Ok(Box::new(equipment.map_err(MemberError::Device)?))
 }

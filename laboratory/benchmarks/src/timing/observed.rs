@@ -179,6 +179,7 @@ impl<M: Machine> Machine for Observed<M> {
                 Output::Report(_) => continue,
                 Output::Send(frame) => Output::Send(frame),
                 Output::Drive { outputs, sampled } => Output::Drive { outputs, sampled },
+                Output::Follow(outputs) => Output::Follow(outputs),
                 Output::Connect(connects) => Output::Connect(connects),
                 Output::Retain(record) => Output::Retain(record),
                 Output::Answer(answer) => Output::Answer(answer),

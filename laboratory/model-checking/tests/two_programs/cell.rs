@@ -8,7 +8,7 @@ use understudy_cycle::{
 };
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
-use understudy_remote_io::{PairSettings, Release, StaleState, ValueFault};
+use understudy_remote_io::{PairSettings, PairedInput, Release, StaleState, ValueFault, Wiring};
 use understudy_simulator::Parts;
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Image, Moment, ProgramHash, ProgramId, StationId,
@@ -81,10 +81,11 @@ fn plant() -> Circuit {
 }
 
 /// One program with two remote I/Os, a controller and an understudy.
-pub(crate) fn paired(take_over_after: u32) -> Parts {
+pub(crate) fn paired(wiring: Wiring) -> Parts {
     let mut parts = cell(&[program(false)], (1, 0), Turns::Token);
     for remote_io in &mut parts.remote_ios {
-        remote_io.pair = Some(PairSettings { is_twin: false, take_over_after });
+        remote_io.pair = Some(PairSettings { wiring, ..PairSettings::exclusive(1) });
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
     }
     parts
 }
@@ -151,6 +152,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         stale_state: StaleState::Operator,
         restart: None,
         pair: None,
+        paired_inputs: Vec::new(),
     });
     let plants = circuits.iter().map(|circuit| {
         let kind = ModelKind::Program(Box::new((&plant()).into()));

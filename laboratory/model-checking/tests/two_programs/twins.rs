@@ -1,10 +1,16 @@
 //! One program with two remote I/Os, a controller and an understudy: every schedule of two faults.
 
+use understudy_remote_io::Wiring;
+
 use super::*;
 
 /// Everything within the budget holds where the other remote I/O takes over after one cycle, in this number of states.
 fn check_pair(budget: Budget, states: usize) {
-    let model = Model::new(paired(1), Start::default(), budget);
+    check_wired(Wiring::Exclusive, budget, states);
+}
+
+fn check_wired(wiring: Wiring, budget: Budget, states: usize) {
+    let model = Model::new(paired(wiring), Start::default(), budget);
     let verdict = check(model.expect("it synchronises"), 2);
     assert_eq!(verdict.counterexamples, []);
     assert_eq!(verdict.states, states, "a protocol that has changed has other states");
@@ -39,4 +45,23 @@ fn a_cut_and_a_crash_or_a_stop_in_two_cycles() {
 #[ignore = "it takes two minutes"]
 fn a_loss_and_another_fault_in_two_cycles() {
     check_pair(Budget { losses: 2, crashes: 1, stops: 1, ..TWO }, 1_409_406);
+}
+
+/// Both wired to the plant: what one of the two drives next to the author is what the author drove in one of the last six cycles, or nothing.
+const PARALLEL: Wiring = Wiring::Parallel { discrepancy_cycles: 2 };
+
+#[test]
+fn one_fault_of_two_that_are_both_wired() {
+    check_wired(PARALLEL, Budget { cuts: 1, ..ONE }, 43_560);
+}
+
+#[test]
+fn two_faults_of_two_that_are_both_wired() {
+    check_wired(PARALLEL, Budget { losses: 2, cycles: 1, ..TWO }, 167_053);
+}
+
+#[test]
+#[ignore = "it takes a minute"]
+fn two_crashes_or_stops_of_two_that_are_both_wired() {
+    check_wired(PARALLEL, Budget { cuts: 0, ..TWO }, 680_033);
 }

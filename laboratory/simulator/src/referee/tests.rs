@@ -52,6 +52,7 @@ fn referee() -> Referee {
         stale_state: StaleState::Operator,
         restart: None,
         pair: None,
+        paired_inputs: Vec::new(),
     };
     Referee::new(&settings, (&circuit).into())
 }

@@ -77,6 +77,16 @@ pub enum Violation {
         /// The cycle in which it happened.
         moment: Moment,
     },
+    /// The modules of a remote I/O that is not the author drive outputs that no author has driven lately.
+    #[error(
+        "in cycle {moment} modules next to those of the author drive {driven}, which no author has driven lately"
+    )]
+    NotFollowed {
+        /// The cycle in which it happened.
+        moment: Moment,
+        /// What they drive.
+        driven: Image,
+    },
     /// A signal of another program was sampled with a value that the other program did not compute.
     #[error(
         "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"

@@ -18,6 +18,7 @@ impl Hash for Simulation {
             // It is what the slots say.
             wakeups: _,
             plants,
+            modules,
             disks,
             referees,
             // They only judge.
@@ -36,7 +37,7 @@ impl Hash for Simulation {
             founded,
         } = self;
         (twins, driven_by).hash(hasher);
-        (links, stations, remote_ios, plants, disks, referees).hash(hasher);
+        (links, stations, remote_ios, plants, modules, disks, referees).hash(hasher);
         (ready, arrived, holders, misled, unannounced).hash(hasher);
         (violations.len(), spares, pace, founded).hash(hasher);
         for fault in faults {

@@ -2,7 +2,7 @@
 
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_remote_io::{PairSettings, RemoteIo, Settings};
-use understudy_wire::{Member, Part, ProgramId, ProgramSet, StateChoice};
+use understudy_wire::{Image, Member, Part, ProgramId, ProgramSet, StateChoice};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
@@ -100,15 +100,65 @@ impl Simulation {
         self.remote_io_slot(member)?.machine()?.poll_output()
     }
 
-    pub(super) fn show_field(&mut self, program: ProgramId) {
+    pub(super) fn drive_plant(
+        &mut self,
+        program: ProgramId,
+        outputs: &Image,
+        observe: &mut Observe<'_>,
+    ) {
+        self.plants.drive(program, outputs);
         if let Some(field) = self.plants.field(program) {
-            let slot = &mut self.remote_ios[program.index()];
-            let sensors = RemoteIoInput::Field(&field.sensors);
-            slot.give(self.now, Input::RemoteIo(sensors));
-            self.wakeups.set(Member::RemoteIo(program), slot.due());
-            if let Some(twin) = &mut self.twins[program.index()] {
-                twin.give(self.now, Input::RemoteIo(sensors));
-                self.wakeups.set(Member::Twin(program), twin.due());
+            let plant = Member::Plant(program);
+            observe(self.now, self.pace.cycle(), plant, Record::Plant(field));
+        }
+        self.show_field(program);
+    }
+
+    /// Modules next to those of the author drive what the author has driven lately, or nothing.
+    pub(super) fn follow(
+        &mut self,
+        member: Member,
+        program: ProgramId,
+        outputs: &Image,
+        observe: &mut Observe<'_>,
+    ) {
+        let (actuators, is_wrong) = self.modules[program.index()].follow(self.now, member, outputs);
+        if is_wrong {
+            let moment = self.referees[program.index()].truth().map(|(moment, _)| moment);
+            let violation = Violation::NotFollowed {
+                moment: moment.unwrap_or_default(),
+                driven: outputs.clone(),
+            };
+            observe(self.now, self.pace.cycle(), member, Record::Violation(&violation));
+            self.violations.push(violation);
+        }
+        if let Some(actuators) = actuators {
+            self.drive_plant(program, &actuators, observe);
+        }
+    }
+
+    /// An input module of one of two remote I/Os shows a fixed value of an input from now on; the true one again with `None`.
+    pub fn stick_input(&mut self, member: Member, input: usize, value: Option<bool>) {
+        if let Some(program) = member.sampled_program() {
+            self.modules[program.index()].stick(member, input, value);
+            self.show_field(program);
+        }
+    }
+
+    pub(super) fn show_field(&mut self, program: ProgramId) {
+        let Some(field) = self.plants.field(program) else {
+            return;
+        };
+        let modules = &self.modules[program.index()];
+        for member in [Member::RemoteIo(program), Member::Twin(program)] {
+            let sensors = modules.shown(member, &field.sensors);
+            let slot = match member {
+                Member::Twin(_) => self.twins[program.index()].as_mut(),
+                _ => Some(&mut self.remote_ios[program.index()]),
+            };
+            if let Some(slot) = slot {
+                slot.give(self.now, Input::RemoteIo(RemoteIoInput::Field(&sensors)));
+                self.wakeups.set(member, slot.due());
             }
         }
     }

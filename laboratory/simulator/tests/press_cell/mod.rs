@@ -4,11 +4,12 @@
 use std::time::Duration;
 
 use understudy_cycle::Mode;
-use understudy_remote_io::PairSettings;
+use understudy_remote_io::{PairSettings, PairedInput, Wiring};
 use understudy_simulator::Parts;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 pub(crate) const HOLD_CYCLES: u32 = 3;
+pub(crate) const DISCREPANCY_CYCLES: u32 = 10;
 
 /// A robot and its press.
 pub(crate) fn parts(mode: Mode, understudies: usize) -> Parts {
@@ -17,8 +18,19 @@ pub(crate) fn parts(mode: Mode, understudies: usize) -> Parts {
 
 /// Gives each program a second remote I/O, which takes over after this number of cycles.
 pub(crate) fn pair(parts: &mut Parts, take_over_after: u32) {
+    pair_as(parts, PairSettings::exclusive(take_over_after));
+}
+
+/// The same where both are wired to the plant; two readings of an input may differ for [`DISCREPANCY_CYCLES`].
+pub(crate) fn pair_parallel(parts: &mut Parts, take_over_after: u32) {
+    let wiring = Wiring::Parallel { discrepancy_cycles: DISCREPANCY_CYCLES };
+    pair_as(parts, PairSettings { wiring, ..PairSettings::exclusive(take_over_after) });
+}
+
+fn pair_as(parts: &mut Parts, pair: PairSettings) {
     for remote_io in &mut parts.remote_ios {
-        remote_io.pair = Some(PairSettings { is_twin: false, take_over_after });
+        remote_io.pair = Some(pair);
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
     }
 }
 

@@ -124,15 +124,27 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
     PartChanged { part: Part::Follower, .. } => "part-changed" Notice
-        "follows the other remote I/O of its program: it samples nothing and drives nothing";
+        "follows the other remote I/O of its program: it takes no samples";
     PartChanged { part: Part::TakingOver, .. } => "part-changed" Notice
         "takes over from the other remote I/O of its program: it connects to the field";
     PartChanged { part: Part::Author, .. } => "part-changed" Notice
         "is the author of its program: it samples the inputs and drives the outputs";
     PartnerLost { .. } => "partner-lost" Alarm
-        "does not receive the other remote I/O of its program: its own failure would not be masked";
+        "does not receive the other remote I/O of its program in time: its own failure would not be masked";
     PartnerReceived { .. } => "partner-received" Notice
         "receives the other remote I/O of its program again";
+    InputsDiffer { input, .. } => "inputs-differ" Alarm format!(
+        "the modules of both remote I/Os differ at {}: the value on which they agreed last is sampled",
+        members.place(SignalPlace::Input(*input))
+    );
+    InputExcluded { input, at, .. } => "input-excluded" Alarm format!(
+        "the module of {} at {} is excluded until the operator releases it",
+        members.place(SignalPlace::Input(*input)), members.name(*at)
+    );
+    InputsAgree { input, .. } => "inputs-agree" Notice format!(
+        "the modules of both remote I/Os agree at {}, or the operator has released them",
+        members.place(SignalPlace::Input(*input))
+    );
     SecondAuthor { .. } => "second-author" Alarm
         "received the other remote I/O of its program as a second author, and has stopped to drive the outputs";
     Forced { force, .. } => "forced" Alarm members.force(force);

@@ -1,6 +1,6 @@
 //! Signals and their values in words, and the writes that records refer to.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::ops::Deref;
 
 use understudy_journal::{Cycles, Happening, Members, NamedSignal, Record};
@@ -125,10 +125,8 @@ fn image_text<'a>(image: &Image, signals: impl Iterator<Item = &'a NamedSignal>)
 }
 
 fn signal(by: Option<Member>, place: SignalPlace, members: &Members) -> Option<&NamedSignal> {
-    let Some(Member::RemoteIo(program)) = by else {
-        return None;
-    };
-    members.signal(program, place)
+    // Either remote I/O of a program has its signals.
+    members.signal(by?.sampled_program()?, place)
 }
 
 fn place_text(by: Option<Member>, place: SignalPlace, members: &Members) -> String {
@@ -168,6 +166,22 @@ pub(crate) fn force_text(by: Option<Member>, force: &Force, members: &Members) -
     let value = signal_value(by, force.signal, force.value, members);
     let Force { seconds, owner, reason, .. } = force;
     format!("{signal} is forced to {value} for {seconds} s by {owner}: {reason}")
+}
+
+/// Inputs whose modules are in doubt, with the remote I/O whose module is excluded.
+pub(crate) fn modules_text(
+    by: Option<Member>,
+    inputs: &BTreeMap<u16, Option<Member>>,
+    members: &Members,
+) -> String {
+    let texts = inputs.iter().map(|(input, excluded)| {
+        let input = place_text(by, SignalPlace::Input(*input), members);
+        match excluded {
+            None => format!("the modules differ at {input}, whose last agreed value is sampled"),
+            Some(at) => format!("the module of {input} at {} is excluded", members.name(*at)),
+        }
+    });
+    texts.collect::<Vec<_>>().join("; ")
 }
 
 fn number_text(of: Elementary, stored: u64, unit: Option<&str>) -> String {

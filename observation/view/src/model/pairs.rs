@@ -1,14 +1,20 @@
-//! Programs with two remote I/Os: which one drives, and whether the other one is there.
+//! Programs with two remote I/Os: which one drives, whether the other one is there, and whether the input modules of both agree.
+
+use std::collections::BTreeMap;
 
 use understudy_journal::Record;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_wire::{Member, Part, ProgramId};
 
 use super::Model;
-use super::standing::Change;
+use super::standing::{Change, ProgramChange};
+use crate::describe::modules_text;
 
 /// Alarm of an author whose partner is not received.
 pub(super) const PARTNER_LOST: &str = "partner-lost";
+
+/// Alarm of inputs whose two modules differ, or of which one is excluded.
+pub(super) const INPUT_MODULES: &str = "input-modules";
 
 impl Model {
     /// Whether a program has two remote I/Os.
@@ -57,7 +63,7 @@ impl Model {
                 let names: Vec<String> =
                     both.map(|one| self.members.name(one).to_owned()).collect();
                 for name in names {
-                    self.alarms.all_over(&name, &[PARTNER_LOST], cycle);
+                    self.alarms.all_over(&name, &[PARTNER_LOST, INPUT_MODULES], cycle);
                 }
                 self.changes.push(cycle, Change::Author(program, member));
                 // Records of the last samples of the other one may be missing.
@@ -72,11 +78,43 @@ impl Model {
             RemoteIoEvent::PartnerReceived { .. } => {
                 self.alarms.all_over(&record.name, &[PARTNER_LOST], cycle);
             }
+            RemoteIoEvent::InputsDiffer { input, .. } => {
+                let change = ProgramChange::ModulesDiffer(*input, None);
+                self.modules_changed(record, program, cycle, change);
+            }
+            RemoteIoEvent::InputExcluded { input, at, .. } => {
+                let change = ProgramChange::ModulesDiffer(*input, Some(*at));
+                self.modules_changed(record, program, cycle, change);
+            }
+            RemoteIoEvent::InputsAgree { input, .. } => {
+                self.modules_changed(record, program, cycle, ProgramChange::ModulesAgree(*input));
+            }
             RemoteIoEvent::SecondAuthor { .. } => {
                 let text = self.described(record).text;
                 self.alarms.occurred((record.name.clone(), "second-author"), cycle, text);
             }
             _ => {}
         }
+    }
+
+    /// One alarm names all inputs of a program whose modules are in doubt. One more asks for an acknowledgement again.
+    fn modules_changed(
+        &mut self,
+        record: &Record,
+        program: ProgramId,
+        cycle: i64,
+        change: ProgramChange,
+    ) {
+        let asks_again = !matches!(change, ProgramChange::ModulesAgree(_));
+        let by = record.member.unwrap_or(Member::RemoteIo(program));
+        self.changes.reported(by, cycle, Change::Program(program, change));
+        let subject = (record.name.clone(), INPUT_MODULES);
+        let standing = self.changes.now().program(program);
+        let inputs = standing.map_or_else(BTreeMap::new, |own| own.modules.clone());
+        if inputs.is_empty() {
+            return self.alarms.over(&subject, cycle);
+        }
+        let text = modules_text(record.member, &inputs, &self.members);
+        self.alarms.replace(subject, cycle, text, asks_again);
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct ProgramStanding {
     pub(crate) forced: Vec<ForcedSignal>,
     /// Whether signals of other programs are valid, by the first bit of their inputs; those that its remote I/O has reported.
     pub(crate) validity: BTreeMap<u16, bool>,
+    /// Inputs that two modules read and that differ, by their first bits, with the remote I/O whose module is excluded.
+    pub(crate) modules: BTreeMap<u16, Option<Member>>,
     /// Stations whose state of it its remote I/O has found faulty.
     pub(crate) excluded: StationSet,
     pub(crate) protection: Option<Protection>,
@@ -151,6 +153,10 @@ impl Standing {
             }
             Change::Author(program, member) => {
                 self.authors.insert(*program, *member);
+                // A new author tells of all that are excluded.
+                if let Some(own) = self.programs.get_mut(program.index()) {
+                    own.modules.clear();
+                }
             }
             Change::BecameCycleMaster(station) => {
                 self.cycle_masters.insert(*station);
@@ -314,16 +320,25 @@ impl StationChange {
 /// A change of a program at its remote I/O.
 #[derive(Debug, Clone)]
 pub(super) enum ProgramChange {
-    Started { awaits_release: bool },
+    Started {
+        awaits_release: bool,
+    },
     Released,
     Excluded(StationSet),
     Readmitted(StationId),
     Forced(Force),
     Unforced(SignalPlace),
     Validity(u16, bool),
+    /// The modules of an input agree.
+    ModulesAgree(u16),
+    /// They differ, and the one of this remote I/O is excluded where one is.
+    ModulesDiffer(u16, Option<Member>),
     Protection(Box<Protection>),
     Lost(Option<Box<LostState>>),
-    Plant { finished: u64, plant_faults: u64 },
+    Plant {
+        finished: u64,
+        plant_faults: u64,
+    },
 }
 
 impl ProgramChange {
@@ -346,6 +361,12 @@ impl ProgramChange {
             Self::Unforced(signal) => own.forced.retain(|other| other.force.signal != *signal),
             Self::Validity(input, valid) => {
                 own.validity.insert(*input, *valid);
+            }
+            Self::ModulesAgree(input) => {
+                own.modules.remove(input);
+            }
+            Self::ModulesDiffer(input, excluded) => {
+                own.modules.insert(*input, *excluded);
             }
             Self::Protection(protection) => own.protection = Some(protection.as_ref().clone()),
             Self::Lost(lost) => own.lost = lost.as_deref().cloned(),

@@ -13,6 +13,7 @@ mod drawings;
 mod fold;
 mod forced;
 mod hostile;
+mod input_modules;
 mod losses;
 mod margin;
 mod networks;

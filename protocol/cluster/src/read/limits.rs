@@ -24,7 +24,7 @@ const HOLDING_BYTES: usize = 8 * INTEGER_BYTES;
 const WRITES_BYTES: usize = MAXIMUM_SESSIONS * (INTEGER_BYTES + 5) + MAXIMUM_PULSES * (3 + 5);
 
 /// At most so many bytes of an image, with the members of a word besides.
-fn image_bytes(bits: usize) -> usize {
+const fn image_bytes(bits: usize) -> usize {
     (bits.div_ceil(64) + 2) * INTEGER_BYTES + SET_BYTES
 }
 
@@ -34,6 +34,13 @@ fn sample_bytes(inputs: usize, history: usize, has_operator_inputs: bool) -> usi
         + (history + 1) * image_bytes(inputs)
         + usize::from(has_operator_inputs) * WRITES_BYTES
 }
+
+/// What an author with modules of its own sends to the other remote I/O: its outputs, and the excluded modules of both. It fits for every program.
+const fn modules_bytes(inputs: usize, outputs: usize) -> usize {
+    FRAME_BYTES + 2 * image_bytes(inputs) + image_bytes(outputs)
+}
+
+const _: () = assert!(modules_bytes(MAXIMUM_IMAGE_BITS, MAXIMUM_IMAGE_BITS) <= MAXIMUM_FRAME_BYTES);
 
 /// The turn of an understudy: a word for each program that is silent, one for the rest, all that it holds, and the last inputs of
 /// each program where every remote I/O is silent; `written` programs have operator inputs.
@@ -119,9 +126,9 @@ mod tests {
     use smallvec::SmallVec;
     use understudy_wire::{
         Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-        Lineage, MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Member, Moment, ProgramHash, ProgramId,
-        ProgramSet, Pulse, Recalled, Sample, StationId, StationSet, Step, Turn, Word, WriteId,
-        encode,
+        Lineage, MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Member, Modules, Moment, Pair, Part,
+        ProgramHash, ProgramId, ProgramSet, Pulse, Recalled, Sample, StationId, StationSet, Step,
+        Time, Turn, Word, WriteId, encode,
     };
 
     use super::*;
@@ -184,6 +191,20 @@ mod tests {
                 let bound = sample_bytes(bits, history, true);
                 check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
             }
+            let latest = Some(Time(u64::MAX));
+            let pair = Pair {
+                part: Part::Author,
+                able: true,
+                receives_stations: true,
+                sent: Time(u64::MAX),
+                bound_by: latest,
+                modules: Some(Modules::Author {
+                    outputs: Some(ones(bits)),
+                    answers: latest,
+                    excluded: [ones(bits), ones(bits)],
+                }),
+            };
+            check_body(Member::Twin(ProgramId(63)), Body::Pair(pair), modules_bytes(bits, bits));
             let station = Member::Station(StationId(63));
             for programs in [1, 2, 64] {
                 let holding = |program| Holding {

@@ -3,22 +3,74 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use understudy_remote_io::{PairedInput, PointPlace, SWITCHOVER, Wiring};
+use understudy_text::spelling::suggestion;
+use understudy_text::tables::Constant;
 use understudy_text::{Diagnostic, duration};
+use understudy_typed::Elementary;
 
+use super::Member;
 use super::names::Names;
 use crate::cluster::{PlantPlace, RemoteIo, Twin};
-use crate::device::Connection;
+use crate::device::{Connection, FieldDevice, SerialLine};
+use crate::fields::{ConnectionText, MAXIMUM_MISFITS};
 use crate::file::{FieldSection, TwinSection};
 
-/// Reads a twin; nothing where it has no name, which is reported.
-pub(crate) fn read(
+/// Reads a twin of a remote I/O; nothing where it has no name, which is reported.
+pub(super) fn read(
     section: TwinSection,
+    (remote_io, member): (&RemoteIo, &Member),
     field: Option<&FieldSection>,
     period: Duration,
     names: &mut Names,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Twin> {
     names.listen(&section.addresses, diagnostics);
+    check_keys(&section, diagnostics);
+    let (paired_inputs, device) = if section.is_parallel {
+        check_outputs(&section, remote_io, member, diagnostics);
+        let device = own_device(&section, remote_io, field, diagnostics);
+        (paired_inputs(&section, member, diagnostics), device)
+    } else {
+        check_device(&section, field, period, diagnostics);
+        (Vec::new(), None)
+    };
+    let name = section.name?;
+    names.declare(&name.value, name.span, diagnostics);
+    Some(Twin {
+        name: name.value,
+        take_over_after: section.take_over_after,
+        wiring: match section.is_parallel {
+            true => Wiring::Parallel { discrepancy_cycles: section.discrepancy_cycles },
+            false => Wiring::Exclusive,
+        },
+        paired_inputs,
+        field: device,
+        addresses: section.addresses.map(|address| address.value),
+    })
+}
+
+/// Reports keys of the other wiring.
+fn check_keys(section: &TwinSection, diagnostics: &mut Vec<Diagnostic>) {
+    for key in &section.special {
+        let is_exclusive = key.value == "owner_timeout";
+        if is_exclusive == section.is_parallel {
+            let (wiring, other) =
+                if is_exclusive { ("exclusive", "parallel") } else { ("parallel", "exclusive") };
+            let message = format!("`{}` of a twin with wiring \"{other}\"", key.value);
+            let help = format!("only wiring \"{wiring}\" has it: remove one of the two");
+            diagnostics.push(Diagnostic::error("U0259", message, key.span.clone()).with_help(help));
+        }
+    }
+}
+
+/// Whether one device can be given from one remote I/O to the other.
+fn check_device(
+    section: &TwinSection,
+    field: Option<&FieldSection>,
+    period: Duration,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
     if matches!(field.and_then(|field| field.connection.as_ref()), Some(Connection::Rtu(_))) {
         let message =
             "a twin of a remote I/O whose device is on a serial line: the line has one master";
@@ -33,21 +85,131 @@ pub(crate) fn read(
             duration::text(period),
             duration::text(owner_timeout),
         );
-        diagnostics.push(Diagnostic::error("U0229", message, section.span).with_help(format!(
+        let found = Diagnostic::error("U0229", message, section.span.clone());
+        diagnostics.push(found.with_help(format!(
             "use `take_over_after = {needed}`, or a shorter time-out of the device"
         )));
     }
-    let name = section.name?;
-    names.declare(&name.value, name.span, diagnostics);
-    Some(Twin {
-        name: name.value,
-        take_over_after: after,
-        addresses: section.addresses.map(|address| address.value),
-    })
 }
 
-/// Cycles of a switchover after `take_over_after`: the one in which the other remote I/O begins, and one until it may.
-const TAKE_OVER: u32 = 2;
+/// The device of the twin: another one than that of the first remote I/O, with the same places.
+fn own_device(
+    section: &TwinSection,
+    remote_io: &RemoteIo,
+    field: Option<&FieldSection>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<FieldDevice> {
+    let has_modbus = section.special.iter().any(|key| key.value == "modbus");
+    let mut refuse = |message: &str, help: &str| {
+        let found = Diagnostic::error("U0259", message, section.span.clone());
+        diagnostics.push(found.with_help(help));
+        None
+    };
+    let first = match (field.map(|field| field.connection.as_ref()), has_modbus) {
+        (None, false) => return None,
+        (None, true) => {
+            let message = "the twin has a device, and its remote I/O has none";
+            return refuse(message, "add `[remote_io.field]`, whose places are those of both");
+        }
+        (Some(_), false) => {
+            let message = "a twin with wiring \"parallel\" and without modules of its own";
+            return refuse(message, "add `modbus = …`: where the device of the twin is");
+        }
+        (Some(first), true) => first?,
+    };
+    let connection = match (section.connection.as_ref()?, first) {
+        (ConnectionText::Tcp(address), _) => Connection::Tcp(*address),
+        (ConnectionText::Rtu(path), Connection::Rtu(line)) => {
+            Connection::Rtu(SerialLine { path: path.clone(), ..line.clone() })
+        }
+        (ConnectionText::Rtu(_), Connection::Tcp(_)) => {
+            let message = "the device of the twin is on a serial line, and the first one is not";
+            return refuse(message, "connect both by Modbus TCP, or both by serial lines");
+        }
+    };
+    if connection == *first {
+        let message = format!("the twin and its remote I/O have one device, {connection}");
+        let help = "name another device, or use wiring \"exclusive\"";
+        return refuse(&message, help);
+    }
+    remote_io.field.clone().map(|device| FieldDevice { connection, ..device })
+}
+
+/// Reports outputs that two modules cannot drive together.
+fn check_outputs(
+    section: &TwinSection,
+    remote_io: &RemoteIo,
+    member: &Member,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let Some((_, interface)) = &member.code else {
+        return;
+    };
+    let is_number = |of: Elementary| of != Elementary::Bool && !of.is_bit_string();
+    let numbers = interface.outputs.iter().filter(|output| is_number(output.of));
+    for output in numbers.take(MAXIMUM_MISFITS) {
+        let message = format!(
+            "`{}` is {}, and two modules through diodes drive outputs of bits only",
+            output.name, output.of
+        );
+        let found = Diagnostic::error("U0260", message, section.span.clone());
+        diagnostics
+            .push(found.with_help("use wiring \"exclusive\" for a program with this output"));
+    }
+    let safe = &remote_io.fail_safe;
+    let is_set = |first: u32, bits: u32| {
+        (first..first + bits).map(|bit| bit as usize).any(|bit| bit < safe.width() && safe.get(bit))
+    };
+    let set = interface.outputs.iter().filter(|output| is_set(output.bit, output.of.bits()));
+    for output in set.take(MAXIMUM_MISFITS) {
+        let message = format!(
+            "`{}` has a fail-safe value other than 0, which lasts only while one of the two remote I/Os drives: modules that are not driven are released",
+            output.name
+        );
+        diagnostics.push(Diagnostic::warning("U0261", message, section.span.clone()));
+    }
+}
+
+/// All inputs of the program, with their tolerances.
+fn paired_inputs(
+    section: &TwinSection,
+    member: &Member,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<PairedInput> {
+    let Some((_, interface)) = &member.code else {
+        return Vec::new();
+    };
+    let inputs = &interface.inputs;
+    let places: Vec<PointPlace> = inputs.iter().map(PointPlace::of).collect();
+    let mut paired = PairedInput::exact(&places);
+    for (name, value) in section.tolerance.iter().take(MAXIMUM_MISFITS) {
+        let Some(at) = inputs.iter().position(|input| input.name == name.value) else {
+            let message = format!("`{}` has no input `{}`", member.name, name.value);
+            let found = Diagnostic::error("U0209", message, name.span.clone());
+            diagnostics.push(found.with_help(suggestion(&name.value, inputs.names())));
+            continue;
+        };
+        let of = places[at].of;
+        let tolerance = match value {
+            Constant::Whole(number) => *number as f64,
+            Constant::Number(number) => *number,
+            _ => f64::NAN,
+        };
+        if !(of.is_integer() || of.is_real()) {
+            let message = format!("`{}` is {of}: only a number has a tolerance", name.value);
+            diagnostics.push(Diagnostic::error("U0204", message, name.span.clone()));
+        } else if !(tolerance >= 0.0 && tolerance.is_finite()) {
+            let message = format!(
+                "the tolerance of `{}` is not 0 or more: write units of the input, such as 0.5",
+                name.value
+            );
+            diagnostics.push(Diagnostic::error("U0204", message, name.span.clone()));
+        } else {
+            paired[at].tolerance = tolerance;
+        }
+    }
+    paired
+}
 
 /// Warns of simulated plants that fall safe while a twin takes over.
 pub(crate) fn check_watchdogs(
@@ -60,7 +222,7 @@ pub(crate) fn check_watchdogs(
         let (Some(twin), Some(plant)) = (&remote_io.twin, plant) else {
             continue;
         };
-        let needed = twin.take_over_after + TAKE_OVER + 1;
+        let needed = twin.take_over_after + SWITCHOVER + 1;
         if plant.watchdog_cycles < needed {
             let message = format!(
                 "the watchdog of `{}` runs out after {} cycles, before `{}` has taken over",

@@ -72,7 +72,10 @@ fn members_with_another_schedule_have_another_hash() {
 
 #[test]
 fn whatever_matters_is_in_the_hash() {
-    let different: [&[(&str, &str, &str)]; 23] = [
+    let twin = |wiring: &str| {
+        format!("controller = \"press\"\ntwin = {{ name = \"two\", wiring = \"{wiring}\" }}\n")
+    };
+    let different: [&[(&str, &str, &str)]; 27] = [
         &[(FILE, "\"press-cell\"", "\"press-cell-2\"")],
         &[(FILE, "10ms", "11ms")],
         &[(FILE, "period", "mode = \"paper\"\nperiod")],
@@ -88,6 +91,18 @@ fn whatever_matters_is_in_the_hash() {
         &[(FILE, "grip = true", "move_up = true")],
         &[(FILE, "controller = \"press\"\n", "controller = \"press\"\nhold_cycles = 4\n")],
         &[(FILE, "controller = \"press\"\n", "controller = \"press\"\nrelease = \"operator\"\n")],
+        &[(FILE, "controller = \"press\"\n", &twin("exclusive"))],
+        &[(FILE, "controller = \"press\"\n", &twin("parallel"))],
+        &[(
+            FILE,
+            "controller = \"press\"\n",
+            &twin("exclusive\", take_over_after = 2, address = \"10.0.0.9:7450"),
+        )],
+        &[(
+            FILE,
+            "controller = \"press\"\n",
+            &twin("parallel\", discrepancy_cycles = 9, address = \"10.0.0.9:7450"),
+        )],
         &[(FILE, "fed_by = \"arm\"", "")],
         &[(FILE, "fed_by", "watchdog_cycles = 4\nfed_by")],
         &[(FILE, "fed_by", "follows = { move_up = \"arm.arm_up\" }\nfed_by")],

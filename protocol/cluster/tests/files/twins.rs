@@ -1,5 +1,10 @@
 //! Second remote I/Os: what is wrong with them in a cluster file.
 
+use understudy_cluster::Cluster;
+use understudy_remote_io::Wiring;
+use understudy_wire::ProgramId;
+
+use crate::common::{findings, load};
 use crate::findings::check;
 
 /// What a twin needs of its device and of its plant, in addresses and names.
@@ -23,8 +28,8 @@ fn twins() {
     assert!(check(&named(""), &serial, "").contains("U0229"));
     assert!(check("wiring = \"exclusive\"", &tcp, "").contains("U0203"), "it has no name");
     assert!(check("name = \"robot-io-2\"", &tcp, "").contains("U0203"), "it has no wiring");
-    let parallel = "name = \"robot-io-2\", wiring = \"parallel\"";
-    assert!(check(parallel, &tcp, "").contains("U0207"), "it is not built");
+    let unknown = "name = \"robot-io-2\", wiring = \"both\"";
+    assert!(check(unknown, &tcp, "").contains("U0207"));
     let taken = "name = \"robot-io\", wiring = \"exclusive\"";
     assert!(check(taken, &tcp, "").contains("U0208"));
     let address = named(", address = \"10.0.1.11:7450\"");
@@ -50,4 +55,79 @@ fn twins() {
         assert!(found.contains("before `robot-io-2` has taken over"), "{found}");
         assert!(!check(&twin, "", &plant(least)).contains("U0258"), "{after}");
     }
+}
+
+const CELL: &str =
+    "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"tank\"\nladder = \"tank.st\"\n";
+
+/// A program with numbers.
+fn tank(output: &str) -> String {
+    format!(
+        "PROGRAM tank\nVAR_INPUT\n level : REAL;\n count : INT;\n full : BOOL;\nEND_VAR\nVAR_OUTPUT\n pump : {output};\nEND_VAR\n\
+         IF full OR level > 1.0 OR count > 1 THEN\n pump := pump;\nEND_IF;\nEND_PROGRAM\n"
+    )
+}
+
+/// The cluster of a tank with a twin whose modules are its own, and what is found.
+fn parallel(more: &str, after: &str, output: &str) -> (Option<Cluster>, String) {
+    let twin = format!("twin = {{ name = \"tank-io-2\", wiring = \"parallel\"{more} }}");
+    let text =
+        format!("{CELL}[[remote_io]]\nname = \"tank-io\"\ncontroller = \"tank\"\n{twin}\n{after}");
+    let loaded = load(&text, &[("tank.st", &tank(output))]);
+    let found = findings(&loaded.reports);
+    (loaded.cluster, found)
+}
+
+const FIELD: &str = "[remote_io.field]\nmodbus = \"10.0.1.60:502\"\n\
+     inputs = { level = \"input:0 real\", count = \"input:2\", full = \"discrete:0\" }\noutputs = { pump = \"coil:0\" }\n";
+
+/// What modules of their own need: two devices, outputs of bits, and keys of this wiring.
+#[test]
+fn twins_with_modules_of_their_own() {
+    let right = |more: &str, after: &str| {
+        let (cluster, found) = parallel(more, after, "BOOL");
+        assert!(!found.contains("error"), "{found}");
+        cluster.expect("a cluster")
+    };
+    let wrong = |more: &str, after: &str, output: &str, expected: &str| {
+        let (_, found) = parallel(more, after, output);
+        assert!(found.contains(expected), "{more} {output}: {found}");
+    };
+    let cluster = right(", tolerance = { level = 0.5, count = 2 }, discrepancy_cycles = 7", "");
+    let settings = cluster.twin_settings(ProgramId(0)).expect("it has a twin");
+    let tolerances: Vec<f64> = settings.paired_inputs.iter().map(|it| it.tolerance).collect();
+    assert_eq!(tolerances, [0.5, 2.0, 0.0, 0.0], "level, count, full, program.reset");
+    let pair = settings.pair.expect("it is one of two");
+    assert_eq!(pair.wiring, Wiring::Parallel { discrepancy_cycles: 7 });
+    // The device of the twin has the places of the first one.
+    let cluster = right(", modbus = \"10.0.1.61:502\"", FIELD);
+    let remote_io = &cluster.remote_ios()[0];
+    let (first, twin) = (remote_io.field.as_ref(), remote_io.twin.as_ref());
+    let (first, own) = (first.expect("a device"), twin.and_then(|it| it.field.as_ref()));
+    let own = own.expect("a device");
+    assert_eq!(own.connection.to_string(), "10.0.1.61:502");
+    assert_eq!((&own.inputs, &own.outputs), (&first.inputs, &first.outputs));
+    let serial = FIELD.replace("10.0.1.60:502", "rtu:/dev/ttyUSB0");
+    right(", modbus = \"rtu:/dev/ttyUSB1\"", &serial);
+
+    wrong("", FIELD, "BOOL", "U0259");
+    wrong(", modbus = \"10.0.1.61:502\"", "", "BOOL", "U0259");
+    wrong(", modbus = \"10.0.1.60:502\"", FIELD, "BOOL", "have one device");
+    wrong(", modbus = \"rtu:/dev/ttyUSB1\"", FIELD, "BOOL", "U0259");
+    wrong(", modbus = \"rtu:/dev/ttyUSB0\"", &serial, "BOOL", "have one device");
+    wrong(", owner_timeout = \"1ms\"", "", "BOOL", "U0259");
+    wrong(", tolerance = { full = 1 }", "", "BOOL", "U0204");
+    wrong(", tolerance = { level = -1 }", "", "BOOL", "U0204");
+    wrong(", tolerance = { levle = 1 }", "", "BOOL", "U0209");
+    wrong(", discrepancy_cycles = 1", "", "BOOL", "U0205");
+    for number in ["REAL", "INT", "TIME"] {
+        wrong("", "", number, "U0260");
+    }
+    let (cluster, found) = parallel("", "", "WORD");
+    assert!(cluster.is_some(), "{found}");
+    wrong("", "fail_safe = { pump = true }\n", "BOOL", "U0261");
+    let keys = "name = \"tank-io-2\", wiring = \"exclusive\", discrepancy_cycles = 9";
+    let text = format!("{CELL}[[remote_io]]\ncontroller = \"tank\"\ntwin = {{ {keys} }}\n");
+    let found = findings(&load(&text, &[("tank.st", &tank("BOOL"))]).reports);
+    assert!(found.contains("U0259"), "{found}");
 }

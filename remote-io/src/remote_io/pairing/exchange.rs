@@ -5,6 +5,7 @@ use understudy_wire::{
 };
 
 use super::super::RemoteIo;
+use super::modules::is_of_use;
 use super::{AWAITED_ANSWERS, Partner};
 use crate::event::Event;
 
@@ -53,9 +54,12 @@ impl RemoteIo {
         let Some(pairing) = &mut self.pairing else {
             return;
         };
-        let was_reported = pairing.partner.is_lost;
-        pairing.partner = Partner { at: now, is_known: true, is_lost: false };
-        pairing.theirs = Some(*theirs);
+        let was_lost = pairing.partner.is_lost;
+        if pairing.part != Part::Author || is_of_use(theirs) {
+            pairing.partner = Partner { at: now, is_known: true, is_lost: false };
+        }
+        let is_back = was_lost && !pairing.partner.is_lost;
+        pairing.theirs = Some(theirs.clone());
         if let Some(sent) = theirs.bound_by.filter(|sent| pairing.sent.contains(sent)) {
             pairing.promised = pairing.promised.max(Some(sent));
         }
@@ -74,7 +78,7 @@ impl RemoteIo {
             pairing.is_bound(now);
             pairing.bound_by = Some(theirs.sent);
         }
-        if was_reported {
+        if is_back {
             self.report(Event::PartnerReceived { moment });
         }
         if is_beaten {
@@ -84,6 +88,9 @@ impl RemoteIo {
         if binds {
             self.question = None;
             self.follow_again(now);
+        }
+        self.receive_modules(now, theirs);
+        if binds {
             self.send_pair();
         }
     }
@@ -142,6 +149,7 @@ impl RemoteIo {
     }
 
     pub(super) fn send_pair(&mut self) {
+        let modules = self.modules_to_send();
         let Some(pairing) = &mut self.pairing else {
             return;
         };
@@ -155,6 +163,7 @@ impl RemoteIo {
             receives_stations: pairing.receives_stations,
             sent: pairing.now,
             bound_by: pairing.bound_by.filter(|_| pairing.part != Part::Author),
+            modules,
         };
         self.member.send(Body::Pair(pair));
     }

@@ -1,6 +1,5 @@
 //! When one of two remote I/Os of a program takes over, and when it gives the outputs to the other one.
 
-use understudy_cycle::Output;
 use understudy_wire::{Part, Time};
 
 use super::super::{Deadline, Question, RemoteIo};
@@ -21,6 +20,7 @@ impl RemoteIo {
 
     /// A deadline is over: counts it, reports to the other one, and begins to take over.
     pub(in crate::remote_io) fn end_pair_deadline(&mut self, now: Time) {
+        let is_sensed = self.is_sensed();
         let Some(pairing) = &mut self.pairing else {
             return;
         };
@@ -35,7 +35,7 @@ impl RemoteIo {
             _ => 0,
         };
         // What the operator has chosen waits for the field device.
-        if self.sensors.is_none() && pairing.followed.is_none() {
+        if !is_sensed && pairing.followed.is_none() {
             pairing.since.0 = now;
         }
         let patience = after.saturating_mul(IDLE_PATIENCE);
@@ -50,13 +50,15 @@ impl RemoteIo {
         }
         self.hand_over(now, is_idle);
         self.begin_to_take_over(now);
+        self.follow_outputs(now);
         self.send_pair();
     }
 
     /// The outputs are given to the other one where the field device of this one does not answer, or no station follows it.
     fn hand_over(&mut self, now: Time, is_idle: bool) {
         let can_take_over = |pairing: &Pairing| {
-            let reported = pairing.theirs.filter(|theirs| theirs.able && theirs.receives_stations);
+            let reported =
+                pairing.theirs.as_ref().filter(|theirs| theirs.able && theirs.receives_stations);
             reported.is_some() && self.is_promised(pairing)
         };
         let has_partner = self.pairing.as_ref().is_some_and(can_take_over);
@@ -94,7 +96,7 @@ impl RemoteIo {
                 pairing.part = Part::TakingOver;
                 pairing.idle = 0;
                 pairing.refused = 0;
-                self.member.put(Output::Connect(true));
+                self.connect_field();
                 self.report_part();
             }
             (true, true) => pairing.refused = 0,

@@ -1,0 +1,254 @@
+//! Inputs that two modules read, one at each remote I/O of a program: which value counts, and which module is excluded. The rule is that of redundant
+//! input modules of the S7-400H.
+//!
+//! ```text
+//!   Agree ── the readings differ ──► Differ ── in `discrepancy_cycles` samples in a row ──► Doubted ── one of the two moves ──► Excluded: the other one
+//!     ▲                                 │                                                      │                                   │
+//!     └────────── they agree ───────────┴──────────── both move, and agree ────────────────────┴──────── the operator releases it ─┘
+//! ```
+//!
+//! Invariant: while two readings differ and neither module is excluded, the value that was sampled last counts.
+
+use understudy_wire::Image;
+
+use crate::source::PointPlace;
+
+/// An input that modules of both remote I/Os read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairedInput {
+    /// Its place in u(i).
+    pub place: PointPlace,
+    /// Greatest difference of two readings of a number that agree; 0 of a BOOL or a bit string.
+    pub tolerance: f64,
+}
+
+impl PairedInput {
+    /// Inputs whose readings agree only where they are equal.
+    pub fn exact(places: &[PointPlace]) -> Vec<Self> {
+        places.iter().map(|place| Self { place: *place, tolerance: 0.0 }).collect()
+    }
+
+    /// The value of two readings that agree: their mean, where they are numbers.
+    fn agreed(self, [one, other]: [u64; 2]) -> Option<u64> {
+        if one == other {
+            return Some(one);
+        }
+        let of = self.place.of;
+        if of.bits() == 1 || of.is_bit_string() || !self.is_within(one, other) {
+            return None;
+        }
+        Some(match (of.is_real(), of.bits()) {
+            (true, 32) => {
+                let mean = (real(one, 32) + real(other, 32)) / 2.0;
+                u64::from((mean as f32).to_bits())
+            }
+            (true, _) => (real(one, 64) / 2.0 + real(other, 64) / 2.0).to_bits(),
+            (false, _) => (of.signed(one) + of.signed(other)).div_euclid(2) as u64 & of.mask(),
+        })
+    }
+
+    fn is_within(self, one: u64, other: u64) -> bool {
+        let of = self.place.of;
+        let difference = if of.is_real() {
+            real(one, of.bits()) - real(other, of.bits())
+        } else {
+            (of.signed(one) - of.signed(other)) as f64
+        };
+        difference.abs() <= self.tolerance
+    }
+
+    /// Whether a module shows another value than it did.
+    fn moves(self, before: u64, now: u64) -> bool {
+        let of = self.place.of;
+        before != now && (of.bits() == 1 || of.is_bit_string() || !self.is_within(before, now))
+    }
+}
+
+fn real(stored: u64, bits: u32) -> f64 {
+    match bits {
+        32 => f64::from(f32::from_bits(stored as u32)),
+        _ => f64::from_bits(stored),
+    }
+}
+
+/// One of two modules that read an input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Module {
+    /// At the first remote I/O.
+    First,
+    /// At its twin.
+    Twin,
+}
+
+impl Module {
+    fn other(self) -> Self {
+        if self == Self::First { Self::Twin } else { Self::First }
+    }
+}
+
+/// How the two modules of an input stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Standing {
+    /// They show the same.
+    Agree,
+    /// They have differed in this number of samples in a row.
+    Differ(u32),
+    /// They differ for too long, since they showed these values.
+    Doubted([u64; 2]),
+    /// This one does not count until the operator releases it.
+    Excluded(Module),
+}
+
+impl Standing {
+    /// Takes two readings. The value that counts; `None` for the one that counted before.
+    fn take(&mut self, input: PairedInput, readings: [u64; 2], patience: u32) -> Option<u64> {
+        let [first, twin] = readings;
+        let agreed = input.agreed(readings);
+        let next = match *self {
+            Self::Excluded(_) => *self,
+            Self::Doubted([old_first, old_twin]) => {
+                match (input.moves(old_first, first), input.moves(old_twin, twin)) {
+                    (true, false) => Self::Excluded(Module::Twin),
+                    (false, true) => Self::Excluded(Module::First),
+                    _ if agreed.is_some() => Self::Agree,
+                    (true, true) => Self::Doubted(readings),
+                    (false, false) => *self,
+                }
+            }
+            _ if agreed.is_some() => Self::Agree,
+            Self::Agree if patience > 1 => Self::Differ(1),
+            Self::Differ(cycles) if cycles + 1 < patience => Self::Differ(cycles + 1),
+            Self::Agree | Self::Differ(_) => Self::Doubted(readings),
+        };
+        *self = next;
+        match next {
+            Self::Excluded(Module::First) => Some(twin),
+            Self::Excluded(Module::Twin) => Some(first),
+            _ => agreed,
+        }
+    }
+
+    /// Takes the reading of one module, where the other one is not received or has no value.
+    fn take_one(&mut self, module: Module, reading: u64) -> Option<u64> {
+        if *self == Self::Excluded(module) {
+            return None;
+        }
+        if *self != Self::Excluded(module.other()) {
+            *self = Self::Agree;
+        }
+        Some(reading)
+    }
+
+    /// What an operator is told of it.
+    fn told(self) -> InputChange {
+        match self {
+            Self::Agree | Self::Differ(_) => InputChange::Agrees,
+            Self::Doubted(_) => InputChange::Differs,
+            Self::Excluded(module) => InputChange::Excluded(module),
+        }
+    }
+}
+
+/// What has changed for an input, as an operator is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum InputChange {
+    /// Its modules are not in doubt, and none is excluded.
+    Agrees,
+    /// They differ for too long.
+    Differs,
+    /// This module is excluded.
+    Excluded(Module),
+}
+
+/// The inputs of a program that two modules read.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct PairedInputs {
+    /// In the order of the inputs.
+    standings: Vec<Standing>,
+    /// u(i) as it counted last.
+    last: Image,
+    /// What an operator was not told yet, by the first bits of the inputs.
+    changes: Vec<(u16, InputChange)>,
+}
+
+impl PairedInputs {
+    /// The inputs where nothing is known of their modules yet, and these values counted last.
+    pub(crate) fn new(inputs: &[PairedInput], last: Image) -> Self {
+        Self { standings: vec![Standing::Agree; inputs.len()], last, changes: Vec::new() }
+    }
+
+    /// u(i) as it counted last.
+    pub(crate) fn last(&self) -> &Image {
+        &self.last
+    }
+
+    /// Takes the readings of the first remote I/O and of the twin. u(i) as it counts now; `None` where neither has a value.
+    pub(crate) fn take(
+        &mut self,
+        inputs: &[PairedInput],
+        readings: [Option<&Image>; 2],
+        patience: u32,
+    ) -> Option<Image> {
+        let mut merged = readings.into_iter().flatten().next()?.clone();
+        for (input, standing) in inputs.iter().zip(&mut self.standings) {
+            let before = standing.told();
+            let value = match readings.map(|image| image.map(|image| input.place.get(image))) {
+                [Some(first), Some(twin)] => standing.take(*input, [first, twin], patience),
+                [Some(first), None] => standing.take_one(Module::First, first),
+                [None, Some(twin)] => standing.take_one(Module::Twin, twin),
+                [None, None] => None,
+            };
+            let value = value.unwrap_or_else(|| input.place.get(&self.last));
+            input.place.set(&mut merged, value);
+            if standing.told() != before {
+                self.changes.push((input.place.bit, standing.told()));
+            }
+        }
+        self.last.clone_from(&merged);
+        Some(merged)
+    }
+
+    /// What has changed since the last call, by the first bits of the inputs.
+    pub(crate) fn take_changes(&mut self) -> Vec<(u16, InputChange)> {
+        std::mem::take(&mut self.changes)
+    }
+
+    /// The operator releases all modules.
+    pub(crate) fn release(&mut self, inputs: &[PairedInput]) {
+        for (input, standing) in inputs.iter().zip(&mut self.standings) {
+            if standing.told() != InputChange::Agrees {
+                self.changes.push((input.place.bit, InputChange::Agrees));
+            }
+            *standing = Standing::Agree;
+        }
+    }
+
+    /// The first bits of the inputs whose module is excluded, at the first remote I/O and at the twin.
+    pub(crate) fn excluded(&self, inputs: &[PairedInput]) -> [Image; 2] {
+        [Module::First, Module::Twin].map(|module| {
+            let mut image = Image::zero(self.last.width());
+            for (input, standing) in inputs.iter().zip(&self.standings) {
+                if *standing == Standing::Excluded(module) {
+                    image.set(usize::from(input.place.bit), true);
+                }
+            }
+            image
+        })
+    }
+
+    /// Excludes the modules that the other remote I/O had excluded.
+    pub(crate) fn exclude(&mut self, inputs: &[PairedInput], excluded: &[Image; 2]) {
+        for (input, standing) in inputs.iter().zip(&mut self.standings) {
+            for (module, image) in [Module::First, Module::Twin].into_iter().zip(excluded) {
+                let place = usize::from(input.place.bit);
+                if place < image.width() && image.get(place) {
+                    *standing = Standing::Excluded(module);
+                    self.changes.push((input.place.bit, standing.told()));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,278 @@
+//! Two remote I/Os that are both wired to the plant, each with modules of its own.
+//!
+//! - **Outputs.** The author sends the outputs that it drives at each deadline, and the follower's modules drive the same. So no output comes of a sample
+//!   that the author does not know of, and forces, ramps and held values are those of the author. A follower that receives none keeps the last ones for as
+//!   long as a switchover may take ([`PairSettings::lasting`]), and then releases them: they are 0. So do those of an author that steps aside.
+//! - **Inputs.** The follower sends what its modules show, and u(i) is made of both ([`PairedInputs`]).
+//!
+//! What is received counts where it answers a frame of the last [`AGE`] periods, so nothing is older, whatever the network and the hosts delay.
+//!
+//! Invariant: the modules of a follower drive what the author has driven in one of the last `lasting` + [`AGE`] periods, or 0.
+
+use understudy_cycle::Output;
+use understudy_wire::{Image, Member, Modules as Sent, Pair, Part, Time};
+
+use super::super::RemoteIo;
+use crate::event::Event;
+use crate::paired_inputs::{InputChange, Module, PairedInputs};
+use crate::settings::{Settings, Wiring};
+
+/// Age in periods up to which inputs and outputs of the other one count: those of the last deadline, where no frame is a period late.
+const AGE: u32 = 2;
+
+/// What one of the two knows of the modules of both.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct Modules {
+    /// Samples in a row in which two readings differ until an operator is told.
+    discrepancy_cycles: u32,
+    inputs: PairedInputs,
+    /// The newest inputs of the other one.
+    theirs: Option<Readings>,
+    /// Outputs that this author drives, until they are sent.
+    driven: Option<Image>,
+    /// Outputs that this follower drives.
+    followed: Option<Followed>,
+    /// Excluded modules, at the first remote I/O and at the twin, as the author has them.
+    excluded: [Image; 2],
+    /// When the newest frame of the other one was sent, on its clock.
+    answers: Option<Time>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Readings {
+    /// `None` where its field does not answer.
+    inputs: Option<Image>,
+    at: Time,
+    /// Whether no sample was made of them yet.
+    is_new: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Followed {
+    outputs: Image,
+    at: Time,
+    /// When they were sent, on the clock of the author.
+    sent: Time,
+}
+
+impl Modules {
+    /// Of a remote I/O with these settings; `None` where only the author is wired to the plant.
+    pub(super) fn of(settings: &Settings) -> Option<Self> {
+        let Wiring::Parallel { discrepancy_cycles } = settings.pair?.wiring else {
+            return None;
+        };
+        let inputs = PairedInputs::new(&settings.paired_inputs, settings.undriven.clone());
+        Some(Self {
+            discrepancy_cycles,
+            excluded: inputs.excluded(&settings.paired_inputs),
+            inputs,
+            theirs: None,
+            driven: None,
+            followed: None,
+            answers: None,
+        })
+    }
+}
+
+impl RemoteIo {
+    fn modules(&mut self) -> Option<&mut Modules> {
+        self.pairing.as_mut()?.modules.as_mut()
+    }
+
+    /// Whether it has modules that nothing else writes, so that it is connected to them whatever its part is.
+    pub(super) fn has_own_modules(&self) -> bool {
+        self.pairing.as_ref().is_some_and(|pairing| pairing.modules.is_some())
+    }
+
+    // ── inputs ──────────────────────────────────────────────────────────────────────────────────────────────────────
+
+    /// The inputs of the other one, where it was received lately and its field answers.
+    fn their_readings(&self) -> Option<&Readings> {
+        let pairing = self.pairing.as_ref()?;
+        let theirs = pairing.modules.as_ref()?.theirs.as_ref()?;
+        let lasts = self.period() * (pairing.settings.take_over_after + 1);
+        let is_recent = pairing.now.since(theirs.at) <= lasts;
+        (is_recent && theirs.inputs.is_some()).then_some(theirs)
+    }
+
+    /// Whether the sensors are known, by modules of this remote I/O or of the other one.
+    pub(in crate::remote_io) fn is_sensed(&self) -> bool {
+        self.sensors.is_some() || self.their_readings().is_some()
+    }
+
+    /// What the sensors show; `None` where it is not known. Called once for each sample.
+    pub(in crate::remote_io) fn read_field(&mut self) -> Option<Image> {
+        if !self.has_own_modules() {
+            return self.sensors.clone();
+        }
+        let theirs = self.their_readings().map(|it| (it.inputs.clone(), it.is_new));
+        let (theirs, is_new) = theirs.unwrap_or((None, true));
+        let own = self.sensors.clone();
+        let pairing = self.pairing.as_mut()?;
+        let is_twin = pairing.settings.is_twin;
+        let modules = pairing.modules.as_mut()?;
+        if let Some(theirs) = &mut modules.theirs {
+            theirs.is_new = false;
+        }
+        // One reading alone says nothing of the other one, which is on its way.
+        if !is_new && own.is_some() {
+            return Some(modules.inputs.last().clone());
+        }
+        let (own, theirs) = (own.as_ref(), theirs.as_ref());
+        let readings = if is_twin { [theirs, own] } else { [own, theirs] };
+        let paired = &self.settings.paired_inputs;
+        let read = modules.inputs.take(paired, readings, modules.discrepancy_cycles);
+        self.report_inputs();
+        read
+    }
+
+    /// The operator releases all modules that were excluded.
+    pub(in crate::remote_io) fn release_inputs(&mut self) {
+        if let Some(modules) = self.pairing.as_mut().and_then(|it| it.modules.as_mut()) {
+            modules.inputs.release(&self.settings.paired_inputs);
+            self.report_inputs();
+        }
+    }
+
+    fn report_inputs(&mut self) {
+        let (program, moment) = (self.settings.program, self.moment());
+        let Some(modules) = self.modules() else {
+            return;
+        };
+        for (input, change) in modules.inputs.take_changes() {
+            self.report(match change {
+                InputChange::Agrees => Event::InputsAgree { moment, input },
+                InputChange::Differs => Event::InputsDiffer { moment, input },
+                InputChange::Excluded(Module::First) => {
+                    Event::InputExcluded { moment, input, at: Member::RemoteIo(program) }
+                }
+                InputChange::Excluded(Module::Twin) => {
+                    Event::InputExcluded { moment, input, at: Member::Twin(program) }
+                }
+            });
+        }
+    }
+
+    /// Begins as the author: with the inputs that were sampled last, and the modules that were excluded.
+    pub(super) fn take_over_modules(&mut self) {
+        let paired = &self.settings.paired_inputs;
+        let Some(pairing) = &mut self.pairing else {
+            return;
+        };
+        let sampled = pairing.received.as_ref().and_then(|sample| sample.without_forces());
+        let last = sampled.unwrap_or(&self.settings.undriven).clone();
+        let Some(modules) = &mut pairing.modules else {
+            return;
+        };
+        modules.inputs = PairedInputs::new(paired, last);
+        modules.inputs.exclude(paired, &modules.excluded);
+        modules.followed = None;
+        modules.driven = None;
+        self.report_inputs();
+    }
+
+    // ── outputs ─────────────────────────────────────────────────────────────────────────────────────────────────────
+
+    /// Notes what this author drives, for the other one.
+    pub(in crate::remote_io) fn note_driven(&mut self, driven: &Image) {
+        if let Some(modules) = self.modules() {
+            modules.driven = Some(driven.clone());
+        }
+    }
+
+    /// The modules of this remote I/O drive nothing until the author is received.
+    pub(super) fn release_modules(&mut self) {
+        let released = Image::zero(self.settings.fail_safe.width());
+        let Some(modules) = self.pairing.as_mut().and_then(|it| it.modules.as_mut()) else {
+            return;
+        };
+        modules.excluded = modules.inputs.excluded(&self.settings.paired_inputs);
+        modules.driven = None;
+        modules.followed = None;
+        self.member.put(Output::Follow(released));
+    }
+
+    /// A deadline is over, at which a follower has received no outputs for a period: they stay, and are released after some time.
+    pub(super) fn follow_outputs(&mut self, now: Time) {
+        let period = self.period();
+        let released = Image::zero(self.settings.fail_safe.width());
+        let Some(pairing) = self.pairing.as_mut().filter(|it| it.part != Part::Author) else {
+            return;
+        };
+        let lasts = period * pairing.settings.lasting();
+        let Some(modules) = &mut pairing.modules else {
+            return;
+        };
+        let outputs = match &modules.followed {
+            Some(followed) if now.since(followed.at) <= period * 5 / 4 => return,
+            Some(followed) if now.since(followed.at) <= lasts => followed.outputs.clone(),
+            _ => {
+                modules.followed = None;
+                released
+            }
+        };
+        self.member.put(Output::Follow(outputs));
+    }
+
+    // ── frames ──────────────────────────────────────────────────────────────────────────────────────────────────────
+
+    pub(super) fn modules_to_send(&mut self) -> Option<Sent> {
+        let pairing = self.pairing.as_mut()?;
+        let modules = pairing.modules.as_mut()?;
+        Some(match pairing.part {
+            Part::Author => Sent::Author {
+                outputs: modules.driven.take(),
+                answers: modules.answers,
+                excluded: modules.inputs.excluded(&self.settings.paired_inputs),
+            },
+            Part::Follower | Part::TakingOver => {
+                Sent::Follower { inputs: self.sensors.clone(), follows: modules.followed.is_some() }
+            }
+        })
+    }
+
+    /// Takes what the other one has sent of its modules. What is not sent in answer to a frame of the last periods may be older, and does not count.
+    pub(super) fn receive_modules(&mut self, now: Time, theirs: &Pair) {
+        let (inputs, outputs) = (self.settings.undriven.width(), self.settings.fail_safe.width());
+        let oldest = self.period() * AGE;
+        let Some(pairing) = &mut self.pairing else {
+            return;
+        };
+        let (Some(modules), Some(sent)) = (&mut pairing.modules, &theirs.modules) else {
+            return;
+        };
+        modules.answers = Some(theirs.sent);
+        let asked = &pairing.sent;
+        let is_present = |answers: Option<Time>| {
+            answers.is_some_and(|at| asked.contains(&at) && now.since(at) <= oldest)
+        };
+        match sent {
+            Sent::Follower { inputs: readings, .. } if is_present(theirs.bound_by) => {
+                let inputs = readings.clone().filter(|image| image.width() == inputs);
+                modules.theirs = Some(Readings { inputs, at: now, is_new: true });
+            }
+            Sent::Author { outputs: driven, answers, excluded }
+                if pairing.part != Part::Author && is_present(*answers) =>
+            {
+                if excluded.iter().all(|image| image.width() == inputs) {
+                    modules.excluded.clone_from(excluded);
+                }
+                let is_newer =
+                    modules.followed.as_ref().is_none_or(|before| theirs.sent > before.sent);
+                let driven = driven.as_ref().filter(|image| image.width() == outputs && is_newer);
+                if let Some(outputs) = driven.cloned() {
+                    let followed =
+                        Followed { outputs: outputs.clone(), at: now, sent: theirs.sent };
+                    modules.followed = Some(followed);
+                    self.member.put(Output::Follow(outputs));
+                }
+            }
+            Sent::Follower { .. } | Sent::Author { .. } => {}
+        }
+    }
+}
+
+/// Whether the other one is of use to an author: its modules drive the same outputs.
+pub(super) fn is_of_use(theirs: &Pair) -> bool {
+    !matches!(theirs.modules, Some(Sent::Follower { follows: false, .. }))
+}
