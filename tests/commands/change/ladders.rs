@@ -159,5 +159,5 @@ fn what_is_proved_of_changed_ladders_is_what_stations_do() {
     let mut counts = Counts::default();
     (0..400).for_each(|seed| check(seed, &mut counts));
     assert!(counts.equal > 60 && counts.differs > 15, "{counts:?}");
-    assert!(counts.left_out < 40, "{counts:?}");
+    assert!(counts.left_out < 50, "{counts:?}");
 }

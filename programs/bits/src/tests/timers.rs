@@ -82,7 +82,7 @@ fn a_machine_goes_on_from_the_state_of_a_circuit() {
         let program = program(statements);
         for keeps_all in [false, true] {
             let shown = Shown { keeps_all, ..Shown::default() };
-            let Ok(Exact { circuit, layout }) = Exact::new(&program, shown) else {
+            let Ok(Exact { circuit, layout, .. }) = Exact::new(&program, shown) else {
                 continue;
             };
             exact += 1;
