@@ -13,8 +13,8 @@
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
 //! | `refused` | asked with a refused order of a person as JSON: it is recorded | all | no |
 //! | `spare/NAME` | asked with the report of the spare NAME as JSON: changes are recorded | NAME | no |
-//! | `attendance` | told by a remote I/O, once a second and at once while a station is missed: the stations that it misses; with its configuration | all | no |
-//! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again; with its configuration | all | no |
+//! | `attendance/lines` | told by a remote I/O, once a second and at once while a station is missed: the stations that it misses; with its configuration | all | no |
+//! | `journal/lines` | told: the lines of its journal, those of a moment at once; twice a second those in effect again; with its configuration | all | no |
 //!
 //! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration, and behind it
 //! that of the one that an online change has loaded.
@@ -60,7 +60,7 @@ pub(crate) use followed::{Gaps, Head, Telemetry, followed};
 pub use spares::{SPARE_REPORTS_EVERY, SpareReport};
 pub(crate) use tls::{
     ATTENDANCE_KEY, JOURNAL_KEY, REFUSED_KEY, SPARE_KEY, WRITE_KEYS, endpoint, hash_key, insert,
-    prefix, tls_config,
+    prefix, tls_config, told_below,
 };
 pub use tls::{Admitted, TlsKeys, Validity};
 
@@ -70,7 +70,7 @@ use answers::{answer, hashes, of_configuration, with_value};
 use followed::Line;
 use refused::RefusedReports;
 use spares::SpareReports;
-use tls::access_control;
+use tls::{access_control, told_as};
 
 /// How often it is looked who is admitted.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -364,7 +364,7 @@ impl<E: Send + 'static> Channel<E> {
         insert(&mut config, "access_control", &rules)?;
         let session = zenoh::open(config).wait()?;
         let publisher = |key: &str| {
-            let publisher = session.declare_publisher(format!("{}/{key}", self.prefix));
+            let publisher = session.declare_publisher(told_as(&self.prefix, key));
             publisher.congestion_control(CongestionControl::Drop).wait()
         };
         let (journal, attendance) = (publisher(JOURNAL_KEY)?, publisher(ATTENDANCE_KEY)?);

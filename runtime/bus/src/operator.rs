@@ -13,7 +13,7 @@ use zenoh::Wait;
 
 use crate::channel::{
     ATTENDANCE_KEY, Gaps, Head, JOURNAL_KEY, REFUSED_KEY, Reporter, SPARE_KEY, SpareReport,
-    TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config,
+    TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config, told_below,
 };
 use crate::error::{BusError, reason};
 use crate::refused_orders::RefusedOrder;
@@ -340,7 +340,7 @@ impl Call {
         };
         let subscriber = self
             .session
-            .declare_subscriber(format!("{}/{key}", self.prefix))
+            .declare_subscriber(told_below(&self.prefix, key))
             .with(zenoh::handlers::FifoChannel::new(WAITING_LINES))
             .wait()
             .map_err(|_| unanswered())?;

@@ -79,6 +79,20 @@ pub(crate) const JOURNAL_KEY: &str = "journal";
 /// Where a remote I/O tells which stations it misses.
 pub(crate) const ATTENDANCE_KEY: &str = "attendance";
 
+/// The key of those who follow what is told: it ends with a wildcard.
+///
+/// Zenoh 1.10.2 reads the faces of a resource without a lock where a message of a key that the receiver has declared passes the access control
+/// (`Resource::get_egress_cache`), while another thread removes the face of a caller who leaves: the process dies. What is told has a longer key than
+/// any that callers declare, so it is sent with its whole key, and nothing is looked up there.
+pub(crate) fn told_below(prefix: &str, what: &str) -> String {
+    format!("{prefix}/{what}/*")
+}
+
+/// The key under which it is told.
+pub(crate) fn told_as(prefix: &str, what: &str) -> String {
+    format!("{prefix}/{what}/lines")
+}
+
 /// Where spares report, each below it under its own name.
 pub(crate) const SPARE_KEY: &str = "spare";
 
@@ -144,7 +158,7 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     let asked: Vec<String> = asked.into_iter().chain([hash.to_owned()]).collect();
     let commands = vec![format!("{prefix}/command/*")];
     let writes = WRITE_KEYS.map(|(_, key)| vec![format!("{prefix}/{key}")]);
-    let told = [JOURNAL_KEY, ATTENDANCE_KEY].map(|what| format!("{prefix}/{what}"));
+    let told = [JOURNAL_KEY, ATTENDANCE_KEY].map(|what| told_below(prefix, what));
     let refused = [format!("{prefix}/{REFUSED_KEY}")];
     let spares = [format!("{prefix}/{SPARE_KEY}/*")];
     let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
