@@ -79,7 +79,7 @@ fn parallel(more: &str, after: &str, output: &str) -> (Option<Cluster>, String) 
 }
 
 const FIELD: &str = "[remote_io.field]\nmodbus = \"10.0.1.60:502\"\n\
-     inputs = { level = \"input:0 real\", count = \"input:2\", full = \"discrete:0\" }\noutputs = { pump = \"coil:0\" }\n";
+     inputs = { level = \"input:0 real\", count = \"input:2 int\", full = \"discrete:0\" }\noutputs = { pump = \"coil:0\" }\n";
 
 /// What modules of their own need: two devices, outputs of bits, and keys of this wiring.
 #[test]
