@@ -96,7 +96,7 @@ impl RemoteIo {
 
     /// It samples a history that begins, or continues one from the state of a station.
     pub(super) fn note_begin(&mut self, begun: Option<Moment>) {
-        self.noting.begun = begun;
+        self.noting.begun = begun.filter(|_| self.noting.is_on);
     }
 
     /// The newest applied output of a program, and the lineage after its sample.

@@ -56,7 +56,7 @@ fn one_in(cycles: u64) -> Budget {
 #[test]
 fn everybody_starts_together() {
     let everybody = [&STATIONS[..], &REMOTE_IOS[..]].concat();
-    check_from(restarted(&everybody), 1, one_in(5), 35_144);
+    check_from(restarted(&everybody), 1, one_in(5), 35_147);
     check_turns(Turns::Parallel, restarted(&everybody), 1, one_in(5), 35_248);
 }
 
