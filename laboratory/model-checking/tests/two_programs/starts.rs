@@ -57,7 +57,7 @@ fn one_in(cycles: u64) -> Budget {
 fn everybody_starts_together() {
     let everybody = [&STATIONS[..], &REMOTE_IOS[..]].concat();
     check_from(restarted(&everybody), 1, one_in(5), 35_147);
-    check_turns(Turns::Parallel, restarted(&everybody), 1, one_in(5), 35_248);
+    check_turns(Turns::Parallel, restarted(&everybody), 1, one_in(5), 35_251);
 }
 
 #[test]
