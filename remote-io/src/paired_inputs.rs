@@ -76,7 +76,7 @@ fn real(stored: u64, bits: u32) -> f64 {
 pub(crate) enum Module {
     /// At the first remote I/O.
     First,
-    /// At its twin.
+    /// At the twin of that remote I/O.
     Twin,
 }
 
@@ -163,7 +163,7 @@ pub(crate) enum InputChange {
 /// The inputs of a program that two modules read.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct PairedInputs {
-    /// In the order of the inputs.
+    /// How the modules of each input stand, in the order of the inputs.
     standings: Vec<Standing>,
     /// u(i) as it counted last.
     last: Image,

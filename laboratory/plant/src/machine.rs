@@ -208,11 +208,7 @@ impl PlantMachine {
         let limit = self.period() * self.settings.watchdog_cycles;
         let mut outputs = Image::zero(self.settings.fail_safe.width());
         let lasting = self.modules.iter().flatten().filter(|it| now.since(it.at) < limit);
-        for module in lasting {
-            for (word, more) in outputs.words_mut().iter_mut().zip(module.outputs.words()) {
-                *word |= more;
-            }
-        }
+        lasting.for_each(|module| outputs.unite(&module.outputs));
         outputs
     }
 

@@ -59,8 +59,8 @@ impl Modules {
         self.actuators(now, outputs.width())
     }
 
-    /// Takes outputs of a remote I/O that is not the author. What the actuators get, where no author drives them; and whether the outputs are none that an
-    /// author has driven lately.
+    /// Takes outputs of a remote I/O that is not the author. What the actuators get, where no author drives them; and whether no author
+    /// has driven these outputs lately.
     pub(crate) fn follow(
         &mut self,
         now: Time,
@@ -80,13 +80,9 @@ impl Modules {
 
     fn actuators(&self, now: Time, width: usize) -> Image {
         let lasts = self.period * self.lasting;
-        let driven = self.driven.iter().flatten();
+        let lasting = self.driven.iter().flatten().filter(|(at, _)| now.since(*at) <= lasts);
         let mut actuators = Image::zero(width);
-        for (_, outputs) in driven.filter(|(at, _)| now.since(*at) <= lasts) {
-            for (word, more) in actuators.words_mut().iter_mut().zip(outputs.words()) {
-                *word |= more;
-            }
-        }
+        lasting.for_each(|(_, outputs)| actuators.unite(outputs));
         actuators
     }
 

@@ -165,7 +165,7 @@ pub enum OrderRefusal {
     NoChoice,
     /// A release where the state of the program is lost: the outputs wait for a choice.
     #[error(
-        "the program waits for the choice of a state, and a release is none: accept the newest available state, or start the program cold"
+        "the program waits for the choice of a state, and a release chooses none: accept the newest available state, or start the program cold"
     )]
     WaitsForChoice,
     /// A choice of the newest state where no station has one.

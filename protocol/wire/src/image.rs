@@ -134,6 +134,13 @@ impl Image {
         }
     }
 
+    /// Sets the bits that `other` has, of an image of this width.
+    pub fn unite(&mut self, other: &Self) {
+        for (word, other) in self.words.iter_mut().zip(&other.words) {
+            *word |= other;
+        }
+    }
+
     /// The first `width` bits, if those past them are 0: the inverse of the padding in (9).
     #[must_use]
     pub fn narrowed(&self, width: usize) -> Option<Self> {

@@ -23,7 +23,7 @@ struct Pending {
     deadlines: u8,
 }
 
-/// A release that has nothing to release has no record: it was taken when so many deadlines are over.
+/// A release that has nothing to release has no record: it was taken once this number of deadlines is over.
 const RELEASED_AFTER: u8 = 5;
 
 impl PendingOrders {

@@ -47,11 +47,13 @@ struct Advance {
 impl Advance {
     /// Takes the newest cycle at `now`; how long ago it changed. What is found first may be as old as the journal.
     fn look(&mut self, newest: Option<i64>, age: Duration, now: Instant) -> Duration {
-        if self.at.is_none() || newest != self.newest {
-            self.at = Some(now.checked_sub(age).filter(|_| self.at.is_none()).unwrap_or(now));
-            self.newest = newest;
-        }
-        self.at.map_or(age, |at| now.saturating_duration_since(at))
+        let at = match self.at {
+            Some(at) if newest == self.newest => at,
+            Some(_) => now,
+            None => now.checked_sub(age).unwrap_or(now),
+        };
+        (self.newest, self.at) = (newest, Some(at));
+        now.saturating_duration_since(at)
     }
 }
 

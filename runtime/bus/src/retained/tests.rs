@@ -1,4 +1,6 @@
 use std::fs;
+use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
@@ -8,6 +10,7 @@ use understudy_wire::{
     StationSet,
 };
 
+use super::writing::{Failure, NOTES_IN_A_FILE, Turn, WAITING_RECORDS, Writer};
 use super::*;
 
 const CLUSTER: ClusterHash = ClusterHash(1);
@@ -446,34 +449,6 @@ fn a_full_disk_is_reported_until_it_has_room() {
     assert_eq!(changed(&mut retainer, 3), None);
     retainer.finish();
     assert_eq!(newest(&files), Some(3));
-}
-
-/// A full disk takes as much again as the file had that is begun anew: an alarm that ends and begins with each file would tell nobody anything.
-#[test]
-fn a_failure_is_over_with_a_longer_file_or_a_whole_one() {
-    let folder = Folder::new("retained-turn");
-    let mut turn = Turn::new(Some(PROGRAM), RetainedFiles::new(&folder, "robot.robot".to_owned()));
-    let file = |turn: &mut Turn, steps: usize| {
-        turn.written = 0;
-        turn.succeeds(100, false);
-        (0..steps).for_each(|_| turn.succeeds(10, false));
-    };
-    file(&mut turn, 5);
-    turn.fails();
-    for _ in 0..3 {
-        file(&mut turn, 5);
-        assert_eq!(turn.fails_at, Some(150));
-        turn.fails();
-        // Nothing of the next file.
-        turn.fails();
-    }
-    file(&mut turn, 6);
-    assert_eq!(turn.fails_at, None, "it is longer");
-    turn.fails();
-    file(&mut turn, 2);
-    assert_eq!(turn.fails_at, Some(160));
-    turn.succeeds(100, true);
-    assert_eq!(turn.fails_at, None, "the file before is whole");
 }
 
 /// A disk that takes nothing for a while: the cycle goes on, what has no room is left out, and that is reported. The steps behind the gap are not used.
