@@ -81,6 +81,9 @@ impl Holders {
     ) {
         if let Some(entry) = self.entries.iter_mut().find(|entry| entry.station == station) {
             entry.holding = holding.copied();
+            if holding.is_some() {
+                entry.retained = None;
+            }
             // A station that has restarted recalls nothing of its earlier life.
             entry.recalled = recalled.cloned();
             entry.silent = 0;

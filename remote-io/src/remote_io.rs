@@ -147,8 +147,8 @@ enum Deadline {
 enum Question {
     /// Which of several states of one cycle the program continues from.
     Disputed,
-    /// Whether the program continues from a stale state, or cold.
-    StateLost,
+    /// Whether the program continues from a stale state, the newest one, or cold.
+    StateLost { newest: Option<Moment> },
     /// Whether the program starts cold, although members of the cluster have another configuration.
     ConfigurationDisputed,
 }
@@ -275,7 +275,7 @@ impl RemoteIo {
         self.note_prepared(station, &frame.header);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
-                self.note(station, &turn.holdings, &[], &turn.recalled, frame.header.alone);
+                self.note(station, &turn.holdings, None, &turn.recalled, frame.header.alone);
                 self.holders.hear_of(turn.heard);
                 if turn.relayed.iter().any(|one| one.program == self.settings.program) {
                     self.note_relayed();
@@ -285,7 +285,7 @@ impl RemoteIo {
             }
             Body::Join(join) => {
                 let Join { holdings, retained, recalled, .. } = join;
-                self.note(station, holdings, retained, recalled, frame.header.alone);
+                self.note(station, holdings, Some(retained), recalled, frame.header.alone);
                 self.note_sample_of(station, holdings, join.lacks);
             }
             _ => {}
@@ -337,18 +337,21 @@ impl RemoteIo {
         self.obeyed(Ok(()));
     }
 
+    /// Takes what a station tells of its states; a turn does not tell which ones it has kept over a power failure.
     fn note(
         &mut self,
         station: StationId,
         holdings: &[Holding],
-        retained: &[Kept],
+        retained: Option<&[Kept]>,
         recalled: &[Recalled],
         alone: bool,
     ) {
         let program = self.settings.program;
         let own = Holding::of(holdings, program);
-        let retained = retained.iter().find(|kept| kept.holding.program == program);
-        self.holders.note_retained(station, retained);
+        if let Some(retained) = retained {
+            let retained = retained.iter().find(|kept| kept.holding.program == program);
+            self.holders.note_retained(station, retained);
+        }
         let recalled = recalled.iter().find(|recalled| {
             recalled.program == program && recalled.inputs.width() == self.settings.undriven.width()
         });

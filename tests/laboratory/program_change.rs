@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use understudy_bus::{RetainedFiles, free_addresses};
-use understudy_wire::{AuthorityHash, PointValue, Retained, Role, Write, WriteId};
+use understudy_wire::{
+    AuthorityHash, Moment, Note, PointValue, Retained, RetainedRun, Role, Write, WriteId,
+};
 
 use super::shared::deployed::{Running, text};
 use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time, understudy};
@@ -117,19 +119,51 @@ impl Plant {
         number(&found)
     }
 
-    /// Until the newest note of the remote I/O on the disk is of a program that keeps values, or of one that does not.
-    fn noted(&self, keeps: bool) {
-        let name = format!("{}.{}", self.name, self.names[2]);
-        let files = RetainedFiles::new(&self.folder.join("kept"), name);
+    fn kept(&self, name: &str) -> RetainedFiles {
+        RetainedFiles::new(&self.folder.join("kept"), format!("{}.{name}", self.name))
+    }
+
+    /// Until what is on the disk is as it should be.
+    fn wait_for_disk(&self, is_there: impl Fn() -> bool) {
         let deadline = Instant::now() + DEADLINE;
-        while files.notes(None).was_retentive != Some(keeps) {
-            assert!(Instant::now() < deadline, "{:?}", files.notes(None));
+        while !is_there() {
+            let notes = self.kept(self.names[2]).notes(None);
+            assert!(Instant::now() < deadline, "{notes:?}");
             std::thread::sleep(Duration::from_millis(20));
         }
     }
 
-    /// The power fails.
+    /// Until the newest note of the remote I/O on the disk is of a program that keeps values, or of one that does not.
+    fn noted(&self, keeps: bool) {
+        self.wait_for_disk(|| self.kept(self.names[2]).notes(None).was_retentive == Some(keeps));
+    }
+
+    /// The power fails, once the disks have the newest applied output and the states that it came from. A disk that takes nothing for a while would make the
+    /// next start a question.
     fn kill(&mut self) {
+        let [controller, understudy, remote_io] = self.names;
+        let applied = |event: &Value| {
+            let is_proved = event["source"] == "direct" || event["source"] == "reconstructed";
+            (event["event"] == "applied" && is_proved)
+                .then(|| serde_json::from_value(event["moment"].clone()).expect("a moment"))
+        };
+        let applied: Option<Moment> = self.events(remote_io).iter().rev().find_map(applied);
+        let notes = self.kept(remote_io);
+        let note = || notes.notes(None).newest;
+        if let Some(applied) = applied {
+            let is_noted = |note: Note| note.applied().is_some_and(|noted| noted >= applied);
+            self.wait_for_disk(|| note().is_some_and(is_noted));
+        }
+        // Without samples, the stations take no further step.
+        self.members.pop();
+        let note = note().filter(|note| applied.is_some() && note.is_retentive);
+        if let Some(applied) = note.as_ref().and_then(Note::applied) {
+            for station in [controller, understudy] {
+                let files = self.kept(&format!("{station}.{controller}"));
+                let newest = || files.runs(None).0.iter().map(RetainedRun::stepped).max();
+                self.wait_for_disk(|| newest() >= Some(applied));
+            }
+        }
         self.members.clear();
     }
 
@@ -340,16 +374,7 @@ fn a_renamed_understudy_changes_nothing() {
     plant.kill();
     plant.names[1] = "deputy";
     plant.start(&program);
-    let started = plant.wait_for("counter-io", |event| {
-        event["event"] == "started-warm" || event["event"] == "state-lost"
-    });
-    // Where the controller was killed a step before the understudy, what that one had kept as well is asked for.
-    if started["event"] == "state-lost" {
-        plant.order("counter-io", r#"choose {"newest":{"cycle":null}}"#);
-        plant.wait_for("counter-io", is("started-warm"));
-    } else {
-        assert_eq!(started["lost"], 0);
-    }
+    assert_eq!(plant.wait_for("counter-io", is("started-warm"))["lost"], 0);
     assert!(plant.applied(16, |_| true) > 20);
 }
 

@@ -21,6 +21,8 @@ pub(crate) struct Disks {
     twins: Vec<Option<Note>>,
     /// Remote I/Os whose notes cannot be read.
     damaged: ProgramSet,
+    /// Remote I/Os whose disks take nothing.
+    read_only: ProgramSet,
     /// The configurations of members that have loaded an online change.
     changed: BTreeMap<Member, Configurations>,
 }
@@ -32,6 +34,7 @@ impl Disks {
             remote_ios: vec![None; remote_ios],
             twins: vec![None; remote_ios],
             damaged: ProgramSet::EMPTY,
+            read_only: ProgramSet::EMPTY,
             changed: BTreeMap::new(),
         }
     }
@@ -104,6 +107,7 @@ impl Disks {
                     run.steps.push(step);
                 }
             }
+            (Member::RemoteIo(program), _) if self.read_only.contains(program) => {}
             (Member::RemoteIo(program), Retained::Note(note)) => {
                 self.remote_ios[program.index()] = Some(note);
                 self.damaged.remove(program);
@@ -119,6 +123,11 @@ impl Disks {
     pub(crate) fn damage(&mut self, program: ProgramId) {
         self.remote_ios[program.index()] = None;
         self.damaged.insert(program);
+    }
+
+    /// From now on the disk of a remote I/O takes nothing.
+    pub(crate) fn write_protect(&mut self, program: ProgramId) {
+        self.read_only.insert(program);
     }
 
     /// A station gets another disk, with nothing on it.

@@ -43,6 +43,11 @@ struct Seen {
     cold: Vec<Option<Moment>>,
     /// Cycles lost by each warm start.
     warm: Vec<Option<u64>>,
+    /// States that the operator was offered, with the stations that have them.
+    offered: Vec<(Option<StationId>, Moment)>,
+    /// States that the warm starts were from.
+    from: Vec<Moment>,
+    refused: u32,
     asked: u32,
     held: u32,
 }
@@ -58,8 +63,15 @@ impl Seen {
             }
             Event::Applied { source: Source::Held, .. } => self.held += 1,
             Event::StartedCold { lost, .. } => self.cold.push(*lost),
-            Event::StartedWarm { lost, .. } => self.warm.push(*lost),
-            Event::StateLost { asks: true, .. } => self.asked += 1,
+            Event::StartedWarm { lost, retained, .. } => {
+                self.warm.push(*lost);
+                self.from.push(*retained);
+            }
+            Event::StateLost { asks: true, newest, holder, .. } => {
+                self.asked += 1;
+                self.offered.extend(newest.map(|newest| (*holder, newest)));
+            }
+            Event::ChoiceRefused { .. } => self.refused += 1,
             _ => {}
         }
     }
@@ -74,7 +86,11 @@ impl Seen {
 fn run(simulation: &mut Simulation, cycles: u64) -> Seen {
     let mut seen = Seen::default();
     // It may wait for a person.
-    let _ = simulation.run(cycles, 400, &mut |_, _, _, record| seen.note(&record));
+    let _ = simulation.run(cycles, 400, &mut |_, _, member, record| {
+        if member == REMOTE_IO {
+            seen.note(&record);
+        }
+    });
     seen
 }
 
@@ -313,5 +329,50 @@ fn two_isolated_stations_do_not_account_for_an_empty_slot() {
         let seen = run(&mut simulation, 120);
         assert_eq!(simulation.violations(), [], "{cycles}");
         assert_eq!(seen.asked, asks, "{cycles}");
+    }
+}
+
+/// The note of the remote I/O is of an earlier start of the cluster, so the operator is asked. Once the station returns that has the newest state, that
+/// one is offered, although the station publishes for another program, and an older one is not taken any more.
+#[test]
+fn the_newest_state_that_a_station_has_kept_is_offered_once_it_returns() {
+    let text = "[cluster]\nname = \"power\"\n\n[[controller]]\nname = \"counter\"\nladder = \"counter.st\"\n\n\
+         [[controller]]\nname = \"other\"\nladder = \"counter.st\"\n\n[[understudy]]\nname = \"understudy\"\n\n\
+         [[remote_io]]\ncontroller = \"counter\"\n\n[[remote_io]]\ncontroller = \"other\"\n";
+    let loaded = read("cluster.toml", text, &mut |_| Ok(COUNTER.to_owned()));
+    let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    let (other, understudy) = (Member::Station(StationId(1)), Member::Station(StationId(2)));
+    let others = [other, REMOTE_IO, Member::RemoteIo(ProgramId(1))];
+    for phase in (0..20).map(|part| f64::from(part) / 20.0) {
+        let mut simulation = Simulation::new(parts(&cluster), Network::default(), 1);
+        run(&mut simulation, 100);
+        simulation.write_protect(ProgramId(0));
+        fail_and_return(&mut simulation, &[CONTROLLER, understudy], 0, 20);
+        fail_and_return(&mut simulation, &others, 0, 20);
+        run(&mut simulation, 200);
+        simulation.schedule(fault((0, 0.9), CONTROLLER, Action::Crash));
+        for member in others.into_iter().chain([understudy]) {
+            simulation.schedule(fault((60, 0.9), member, Action::Crash));
+        }
+        for member in others.into_iter().chain([CONTROLLER]) {
+            simulation.schedule(fault((80, 0.1), member, Action::Restart));
+        }
+        let before = run(&mut simulation, 200);
+        simulation.schedule(fault((0, 0.1), understudy, Action::Restart));
+        let after = run(&mut simulation, 50);
+        let [(Some(StationId(0)), older)] = before.offered[..] else {
+            panic!("{phase}: {before:?}");
+        };
+        let [(Some(StationId(2)), newer)] = after.offered[..] else {
+            panic!("{phase}: {after:?}");
+        };
+        assert!(newer > older, "{phase}: {older:?} {newer:?}");
+        for (cycle, phase) in [(older.cycle, phase), (newer.cycle, 0.99)] {
+            let choice = StateChoice::Newest { cycle: Some(cycle) };
+            simulation.schedule(fault((0, phase), REMOTE_IO, Action::Choose { choice }));
+        }
+        let chosen = run(&mut simulation, 50);
+        assert_eq!((chosen.refused, chosen.from.as_slice()), (1, &[newer][..]), "{phase}");
+        assert_eq!(simulation.violations(), []);
     }
 }

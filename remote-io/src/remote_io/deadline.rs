@@ -157,9 +157,10 @@ impl RemoteIo {
             }
             Selection::Missing(missing) => {
                 let missing = match (missing, self.question) {
-                    (Missing::NotSynchronised | Missing::NoHistory, Some(Question::StateLost)) => {
-                        Missing::StateLost
-                    }
+                    (
+                        Missing::NotSynchronised | Missing::NoHistory,
+                        Some(Question::StateLost { .. }),
+                    ) => Missing::StateLost,
                     _ => missing,
                 };
                 self.missed = self.missed.saturating_add(1);

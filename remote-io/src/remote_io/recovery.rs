@@ -111,7 +111,7 @@ impl RemoteIo {
         }
         match verdict {
             // The operator has been asked: a state that is not received for a moment is no reason to start cold.
-            Verdict::Cold | Verdict::Lost if self.question == Some(Question::StateLost) => {}
+            Verdict::Cold | Verdict::Lost if self.asks_for_lost_state() => {}
             // Nor is one whose station is received too late in each cycle.
             Verdict::Cold | Verdict::Warm(..) | Verdict::Lost if self.holders.may_hold() => {}
             Verdict::Cold | Verdict::Warm(..) if self.may_have_the_wrong_program() => {
@@ -180,18 +180,21 @@ impl RemoteIo {
         }
     }
 
-    /// The state that the newest applied output came from is lost; `newest` is the newest one that a station has, held or retained.
+    fn asks_for_lost_state(&self) -> bool {
+        matches!(self.question, Some(Question::StateLost { .. }))
+    }
+
+    /// The state that the newest applied output came from is lost; `newest` is the newest one that a station has, held or retained. It is reported again
+    /// where another one has become the newest, which the operator would choose.
     fn lose_state(&mut self, moment: Moment, newest: Option<(StationId, Moment)>) {
-        if self.question == Some(Question::StateLost) {
-            return;
-        }
-        self.question = Some(Question::StateLost);
         let applied = self.newest_applied().or_else(|| self.applied_of_another());
-        let asks = self.settings.stale_state == StaleState::Operator
+        let asks = self.asks_for_lost_state()
+            || self.settings.stale_state == StaleState::Operator
             || self.settings.restart == Some(Restart::Operator)
             || self.may_have_the_wrong_program();
         let (holder, newest) = newest.unzip();
-        self.report(Event::StateLost { moment, applied, newest, holder, asks });
+        let event = Event::StateLost { moment, applied, newest, holder, asks };
+        self.ask(Question::StateLost { newest }, event);
         if !asks {
             self.start_cold(moment, applied);
         }
@@ -205,9 +208,11 @@ impl RemoteIo {
         let retained = retained.filter(|_| held.is_none() && self.settings.restart.is_some());
         let newest = held.or(retained.map(|(from, kept)| (from, kept.holding)));
         match (self.question, choice, newest) {
-            (Some(Question::StateLost | Question::ConfigurationDisputed), StateChoice::Cold, _) => {
-                self.start_cold(moment, None)
-            }
+            (
+                Some(Question::StateLost { .. } | Question::ConfigurationDisputed),
+                StateChoice::Cold,
+                _,
+            ) => self.start_cold(moment, None),
             (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
                 if cycle.is_none_or(|cycle| cycle == newest.stepped.cycle) =>
             {

@@ -227,7 +227,7 @@ impl Bench {
         }
         match question {
             Some(Question::Disputed) => name.push_str(", states disputed"),
-            Some(Question::StateLost) => name.push_str(", state lost"),
+            Some(Question::StateLost { .. }) => name.push_str(", state lost"),
             Some(Question::ConfigurationDisputed) => name.push_str(", configuration disputed"),
             None => {}
         }

@@ -124,6 +124,11 @@ impl Simulation {
         self.disks.damage(program);
     }
 
+    /// From now on the disk of a remote I/O takes nothing: its newest note gets old.
+    pub fn write_protect(&mut self, program: ProgramId) {
+        self.disks.write_protect(program);
+    }
+
     /// A station gets an empty disk.
     pub fn lose_disk(&mut self, station: StationId) {
         self.disks.empty(station);

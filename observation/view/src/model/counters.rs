@@ -7,7 +7,7 @@ use understudy_bus::{HostEvent, Quantiles};
 use understudy_journal::{Happening, Record};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId};
 
 /// Counts of one member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -49,6 +49,8 @@ pub struct Counters {
     members: BTreeMap<Member, MemberCounters>,
     programs: Vec<ProgramCounters>,
     stations: u8,
+    /// Programs whose state is lost.
+    lost: ProgramSet,
     not_received: BTreeMap<(StationId, ProgramId), u64>,
 }
 
@@ -153,7 +155,15 @@ impl Counters {
                 own.value_faults += 1;
             }
             RemoteIoEvent::Unprotected { .. } => own.protection_losses += 1,
-            RemoteIoEvent::StateLost { .. } => own.state_losses += 1,
+            // It is reported again where another state has become the newest.
+            RemoteIoEvent::StateLost { .. } => {
+                own.state_losses += u64::from(!self.lost.contains(program));
+                self.lost.insert(program);
+            }
+            RemoteIoEvent::StateRecovered { .. }
+            | RemoteIoEvent::AdoptedLineage { .. }
+            | RemoteIoEvent::StartedCold { .. }
+            | RemoteIoEvent::StartedWarm { .. } => self.lost.remove(program),
             _ => {}
         }
     }

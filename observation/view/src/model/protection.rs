@@ -102,7 +102,7 @@ impl Model {
                     age_cycles: age.and_then(|age| u64::try_from(age).ok()).filter(is_old),
                     asks: *asks,
                 };
-                self.alarms.raise(subject(STATE_LOST), cycle, lost.text());
+                self.alarms.raise_or_retell(subject(STATE_LOST), cycle, lost.text());
                 self.lost_is(program, cycle, Some(lost));
             }
             // A newer state has become available since.

@@ -115,10 +115,10 @@ impl RemoteIo {
         if refused <= gone || self.question.is_some() {
             return;
         }
-        self.question = Some(Question::StateLost);
         let (moment, applied) = (self.moment(), self.newest_applied());
         let newest = self.holders.newest().map(|(from, holding)| (from, holding.stepped));
         let (holder, newest) = newest.unzip();
+        self.question = Some(Question::StateLost { newest });
         self.report(Event::StateLost { moment, applied, newest, holder, asks: true });
     }
 }
