@@ -4,6 +4,7 @@
 //! A state is (x, u), numbered x · 2^|u| + u; registers x are numbered as they are found, the first ones first. A set is a bit a state.
 
 mod check;
+mod extent;
 mod lanes;
 
 use std::hash::BuildHasher;
@@ -13,6 +14,8 @@ use rustc_hash::FxBuildHasher;
 use understudy_logic::{Circuit, Scan};
 
 use crate::effort::{ALWAYS, GoOn, Work};
+use extent::Depths;
+pub(crate) use extent::Extent;
 pub(crate) use lanes::Seen;
 use lanes::{LANES, Lanes};
 
@@ -21,6 +24,9 @@ pub const MAXIMUM_INPUTS: usize = 12;
 
 /// Registers that are listed, whatever the bound: a few hundred bytes each.
 const MAXIMUM_COUNT: usize = 1 << 20;
+/// Bytes of those that are listed where the states are steady, and bytes that each takes next to its bits.
+const MAXIMUM_BYTES: usize = 1 << 28;
+const BYTES: usize = 24;
 
 /// Why there is no list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -109,7 +115,7 @@ impl Explicit {
     /// # Errors
     /// There are more, or too many inputs.
     pub fn new(circuit: &Circuit, bound: usize) -> Result<Self, ExplicitError> {
-        let (listed, error) = Self::explore(circuit, bound, ALWAYS, &mut |_| {});
+        let (listed, error) = Self::explore(circuit, Extent::of(bound), ALWAYS, &mut |_| {});
         error.map_or(Ok(listed), Err)
     }
 
@@ -123,7 +129,7 @@ impl Explicit {
     /// Lists states, the nearest first, and shows every scan from them to `see`. With an error the list is not complete.
     pub(crate) fn explore(
         circuit: &Circuit,
-        bound: usize,
+        extent: Extent,
         go_on: GoOn<'_>,
         see: &mut dyn FnMut(Seen<'_>),
     ) -> (Self, Option<ExplicitError>) {
@@ -149,10 +155,14 @@ impl Explicit {
         let hash = |words: &[u64]| hasher.hash_one(words);
         known_registers.insert_unique(hash(&listed.registers), 0, |_| 0);
         let mut lanes = Lanes::default();
+        let mut depths = Depths::default();
         let mut first = 0;
         while first < listed.states() {
+            depths.note(first / listed.ways, listed.count());
+            let bound = extent.bound(listed.states(), &depths);
             let known = listed.states().min(bound / listed.ways * listed.ways);
-            if known <= first || listed.origins.len() > MAXIMUM_COUNT {
+            let many = if depths.are_steady() { MAXIMUM_BYTES / (8 * width + BYTES) } else { 0 };
+            if known <= first || listed.count() > many.max(MAXIMUM_COUNT) {
                 return (listed, Some(ExplicitError::States { bound }));
             }
             let from = first / listed.ways;

@@ -1,13 +1,14 @@
-//! The part of a circuit that a property depends on, as a circuit of its own: it has fewer states to list than the whole.
+//! The part of a circuit that some properties depend on, as a circuit of its own: it has fewer states to list than the whole.
 
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Variable};
 
 use crate::symbolic::{Cone, Resolved, Signal};
 
-/// A property with what it depends on.
+/// What some properties depend on.
 pub(super) struct Part {
     pub(super) circuit: Circuit,
-    pub(super) property: Resolved,
+    /// Its outputs, by their places in the whole.
+    outputs: Vec<usize>,
     /// The inputs of the part, by their places in the whole.
     inputs: Vec<usize>,
     /// Number of inputs of the whole.
@@ -15,8 +16,8 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The part of `whole` with the variables of `cone`, which is that of `property`.
-    pub(super) fn of(whole: &Circuit, cone: &Cone, property: &Resolved) -> Self {
+    /// The part of `whole` with the variables and signals of `cone`.
+    pub(super) fn of(whole: &Circuit, cone: &Cone) -> Self {
         let mut builder = CircuitBuilder::new(whole.name());
         let (mut inputs, mut registers) = (Vec::new(), Vec::new());
         let (mut of_input, mut of_register) = (Vec::new(), Vec::new());
@@ -57,16 +58,21 @@ impl Part {
         for (&output, &value) in outputs.iter().zip(values) {
             builder.output(&whole.outputs()[output].name, value);
         }
-        let property = property.map(&|signal: &Signal| match *signal {
-            Signal::Output(output) => outputs.binary_search(&output).ok().map(Signal::Output),
-            Signal::Input(input) => inputs.binary_search(&input).ok().map(Signal::Input),
-        });
         Self {
-            property: property.expect("a cone holds the signals of its property"),
             circuit: builder.finish().expect("the names are those of a circuit"),
             count: whole.inputs().len(),
+            outputs,
             inputs,
         }
+    }
+
+    /// A property of the whole as one of the part, which has its signals.
+    pub(super) fn property(&self, property: &Resolved) -> Resolved {
+        let property = property.map(&|signal: &Signal| match *signal {
+            Signal::Output(output) => self.outputs.binary_search(&output).ok().map(Signal::Output),
+            Signal::Input(input) => self.inputs.binary_search(&input).ok().map(Signal::Input),
+        });
+        property.expect("a cone holds the signals of its property")
     }
 
     /// The inputs of a run of the part as those of the whole; the others are 0.

@@ -5,7 +5,7 @@ use understudy_logic::Circuit;
 use super::Bounds;
 use super::sampled::Sampled;
 use crate::effort::{Stopped, Work};
-use crate::explicit::{Explicit, ExplicitError};
+use crate::explicit::{Explicit, ExplicitError, Extent};
 use crate::induction::{Depth, Induction, prove_always};
 use crate::property::Formula;
 use crate::symbolic::{Checker, Resolved, Signal, Verdict};
@@ -154,7 +154,8 @@ type List = (Explicit, Vec<Option<usize>>, Option<ExplicitError>);
 fn list(circuit: &Circuit, bound: usize, bounds: Bounds<'_>) -> List {
     let mut seen: Vec<Option<usize>> = vec![None; circuit.outputs().len()];
     let mut open: Vec<usize> = (0..seen.len()).collect();
-    let (listed, error) = Explicit::explore(circuit, bound, bounds.go_on, &mut |scan| {
+    let extent = Extent::of(bound);
+    let (listed, error) = Explicit::explore(circuit, extent, bounds.go_on, &mut |scan| {
         open.retain(|&question| {
             seen[question] = scan.first(question);
             seen[question].is_none()

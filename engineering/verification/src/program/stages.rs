@@ -1,7 +1,8 @@
 //! Properties of a program by several methods, the cheap ones first:
 //!
 //! ```text
-//! very few states of each part   timers that begin each other: few of many states, and large diagrams
+//! very few states of each part   timers that begin each other: few of many states, and large diagrams;
+//!                                more while each scan finds no more of them than the one before
 //! diagrams of few nodes          most properties of most ladders, with runs that show why
 //! runs of a few scans            invariants of large programs that break soon
 //! induction over few scans       invariants, however large the program is
@@ -20,7 +21,7 @@ use understudy_logic::bdd::BddError;
 use super::part::Part;
 use super::{Answer, Bounds, Subject};
 use crate::effort::{Stopped, Work};
-use crate::explicit::{Explicit, ExplicitError};
+use crate::explicit::{Explicit, ExplicitError, Extent};
 use crate::induction::{Depth, Induction, invariant, prove_always, search};
 use crate::symbolic::{Checker, Cone, Resolved, Verdict, rows};
 
@@ -32,6 +33,8 @@ const REFUSED: u32 = 3;
 const REGISTERS: RangeInclusive<usize> = 16..=64;
 const INPUTS: usize = 4;
 const SHARE: usize = 64;
+/// The share that is listed while each scan finds as many states as the one before.
+const STEADY: usize = 5;
 /// The search of short runs: registers from which on a property needs it, the scans of its runs, operations of all scans together, and steps for all properties.
 const LARGE: usize = 30;
 const SOON: u32 = 40;
@@ -170,26 +173,25 @@ impl<'s, 'b> Stages<'s, 'b> {
         }
     }
 
-    /// Each property by a list of the states of what it depends on.
+    /// Each property by a list of the states of what it depends on: few of them, or more while a scan more finds no more of them.
     fn list_parts(&mut self) {
         if !self.fair.is_empty() {
             return;
         }
         let whole = self.subject.reduced();
         let mut larger = 0;
-        for place in self.left() {
-            let property = &self.properties[place];
-            let cone = Cone::of(whole, [property]);
+        for (cone, places) in self.cones() {
             let registers = cone.registers().count();
             let inputs = cone.variables.len() - registers;
             let is_listed = REGISTERS.contains(&registers) && inputs <= INPUTS;
             if !is_listed || larger >= REFUSED {
                 continue;
             }
-            let part = Part::of(whole, &cone, property);
-            let bound = (Explicit::few(&part.circuit) / SHARE).min(self.bounds.states);
+            let part = Part::of(whole, &cone);
+            let few = Explicit::few(&part.circuit).min(self.bounds.states);
+            let extent = Extent::of(few / SHARE).while_steady(few / STEADY);
             let go_on = self.bounds.go_on;
-            let (listed, error) = Explicit::explore(&part.circuit, bound, go_on, &mut |_| {});
+            let (listed, error) = Explicit::explore(&part.circuit, extent, go_on, &mut |_| {});
             match error {
                 None => {}
                 Some(ExplicitError::Time { .. }) => {
@@ -201,12 +203,31 @@ impl<'s, 'b> Stages<'s, 'b> {
                     continue;
                 }
             }
-            for (holds, run) in listed.check(std::slice::from_ref(&part.property)) {
+            let asked = places.iter().map(|&place| part.property(&self.properties[place]));
+            let answers = listed.check(&asked.collect::<Vec<_>>());
+            for (place, (holds, run)) in places.into_iter().zip(answers) {
+                let cone = Cone::of(whole, [&self.properties[place]]);
                 let trace = run.map(|run| rows(whole, &cone, part.run_of_whole(run)));
                 let answer = if holds { Answer::Holds(trace) } else { Answer::Fails(trace) };
                 self.answer(place, answer);
             }
         }
+    }
+
+    /// The properties that are left, together where they depend on the same registers and inputs.
+    fn cones(&self) -> Vec<(Cone, Vec<usize>)> {
+        let mut cones: Vec<(Cone, Vec<usize>)> = Vec::new();
+        for place in self.left() {
+            let cone = Cone::of(self.subject.reduced(), [&self.properties[place]]);
+            match cones.iter_mut().find(|(known, _)| known.variables == cone.variables) {
+                Some((known, places)) => {
+                    known.signals.extend(cone.signals);
+                    places.push(place);
+                }
+                None => cones.push((cone, vec![place])),
+            }
+        }
+        cones
     }
 
     /// Invariants that break within a few scans: large diagrams and lists take long to find what a run of few scans shows.
@@ -280,7 +301,9 @@ impl<'s, 'b> Stages<'s, 'b> {
         }
         let circuit = self.subject.reduced();
         if self.subject.listed.get().is_none() {
-            let (listed, error) = Explicit::explore(circuit, bound, self.bounds.go_on, &mut |_| {});
+            let extent = Extent::of(bound);
+            let (listed, error) =
+                Explicit::explore(circuit, extent, self.bounds.go_on, &mut |_| {});
             if let Some(error) = error {
                 self.broken_nearby(&listed, &left);
                 if matches!(error, ExplicitError::Time { .. }) {

@@ -90,6 +90,18 @@ fn delays_that_follow_each_other_stay_small() {
     }
 }
 
+/// Three timers that begin each other in a ring have a million states, of which each scan more finds as many as the one before: they are listed
+/// before any diagram is made, which has no end here.
+#[test]
+fn states_that_become_no_more_with_each_scan_are_listed_first() {
+    let (subject, asked) = switched(&programs::random(28, 3, 10, 10_000));
+    let is_list = |work| !matches!(work, Work::Diagrams { .. });
+    let bounds = Bounds { go_on: &is_list, ..Bounds::default() };
+    let answers = subject.check(&asked, Vec::new(), bounds, &mut |_, _| {});
+    let is_decided = |answer: &Answer| !matches!(answer, Answer::Undecided(_));
+    assert!(answers.len() == 3 && answers.iter().all(is_decided));
+}
+
 /// Random programs of timers, edges, mutual resets and counters: the verdicts of a list of all states, after any number of single scans.
 #[test]
 fn programs_of_timers_agree_with_a_list_of_states() {
