@@ -117,7 +117,7 @@ impl OperatorInput {
     }
 
     /// Whether a stored value of its type is within the limits.
-    pub(crate) fn admits(&self, stored: u64) -> bool {
+    pub fn admits(&self, stored: u64) -> bool {
         let of = self.place.of;
         match self.kind {
             OperatorInputKind::Setpoint { low, high } => {

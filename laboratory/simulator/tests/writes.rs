@@ -8,8 +8,8 @@ use understudy_cycle::RemoteIoInput;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation, parts};
 use understudy_wire::{
-    Image, Member, PointValue, ProgramId, Role, StationId, Write, WriteId, WriteOutcome,
-    WriteRefusal,
+    Image, Member, PointValue, ProgramId, Role, StateChoice, StationId, Write, WriteId,
+    WriteOutcome, WriteRefusal,
 };
 
 const CLUSTER: &str = r#"
@@ -70,8 +70,12 @@ const SERVICE: u16 = 64;
 const PATIENCE: u64 = 12;
 
 fn cluster() -> Parts {
-    let loaded = read("cluster.toml", CLUSTER, &mut |name| match name {
-        "counter.st" => Ok(COUNTER.to_owned()),
+    cluster_of(CLUSTER, COUNTER)
+}
+
+fn cluster_of(text: &str, counter: &str) -> Parts {
+    let loaded = read("cluster.toml", text, &mut |name| match name {
+        "counter.st" => Ok(counter.to_owned()),
         _ => Ok(READER.to_owned()),
     });
     let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
@@ -107,6 +111,8 @@ struct Seen {
     /// y of the newest applied true output, by program.
     outputs: [Option<Image>; 2],
     cold_starts: u32,
+    /// Of the first program.
+    warm_starts: u32,
 }
 
 impl Seen {
@@ -130,6 +136,9 @@ impl Seen {
                 self.outputs[program.index()] = Some(outputs.clone())
             }
             Event::StartedCold { .. } => self.cold_starts += 1,
+            Event::StartedWarm { .. } if member == Member::RemoteIo(PROGRAM) => {
+                self.warm_starts += 1
+            }
             _ => {}
         }
     }
@@ -143,8 +152,12 @@ struct Bench {
 
 impl Bench {
     fn new(network: Network, seed: u64) -> Self {
+        Self::of(cluster(), network, seed)
+    }
+
+    fn of(parts: Parts, network: Network, seed: u64) -> Self {
         let mut seen = Seen::default();
-        let mut simulation = Simulation::new(cluster(), network, seed);
+        let mut simulation = Simulation::new(parts, network, seed);
         let mut observe = |_, _, member, record: Record<'_>| seen.observe(member, record);
         simulation.run(3, 200, &mut observe).expect("it gets ready");
         // The first start.
@@ -312,6 +325,66 @@ fn a_person_who_opens_many_sessions_locks_out_no_other_person() {
     check(&mut bench, &write(1, 2, PRESS, true.into()));
     bench.pass(6_000);
     check(&mut bench, &of("anna", 20_000));
+}
+
+/// An operator input with `retain` has its value after each start, warm or cold, and the newest one: not that of the note before.
+#[test]
+fn an_input_keeps_its_value_over_a_power_failure() {
+    let retains = |line: &str| {
+        let text = CLUSTER.replace("initial = 7.0", "initial = 7.0, retain = true");
+        let text = text.replace("name = \"writes\"", "name = \"writes\"\nhistory = 2");
+        text.replacen("controller = \"counter\"\n", &format!("controller = \"counter\"\n{line}"), 1)
+    };
+    let retentive = COUNTER.replace("VAR_OUTPUT", "VAR_OUTPUT RETAIN");
+    for (line, counter, warm) in
+        [("restart = \"cold\"\n", &retentive, false), ("", &retentive, true)]
+    {
+        let parts = cluster_of(&retains(line), counter);
+        let mut bench = Bench::of(parts, Network::default(), 1);
+        bench.write(&write(1, 1, VALUE, real(-3.0)));
+        bench.write(&write(2, 1, PRESS, true.into()));
+        bench.pass(8);
+        assert_eq!((bench.count(), bench.echo()), (1.0, -3.0));
+        let stations = [0, 1, 2].map(StationId);
+        let remote_ios = [PROGRAM, READER_PROGRAM].map(Member::RemoteIo);
+        for action in [Action::Crash, Action::Restart] {
+            for member in stations.map(Member::Station).into_iter().chain(remote_ios) {
+                bench.fault(member, action.clone());
+            }
+            bench.pass(60);
+            bench.seen.outputs = [None, None];
+        }
+        bench.pass(100);
+        let count = if warm { 1.0 } else { 0.0 };
+        assert_eq!((bench.count(), bench.echo()), (count, -3.0), "{line}");
+        // A write that is sent again has no second effect.
+        bench.write(&write(2, 1, PRESS, true.into()));
+        bench.write(&write(1, 2, VALUE, real(-4.0)));
+        bench.pass(8);
+        assert_eq!((bench.count(), bench.echo()), (count, -4.0), "{line}");
+        if !warm {
+            continue;
+        }
+        // The stations alone fail, with what they kept last: the remote I/O has the newest values.
+        // So many steps after the last whole state.
+        bench.pass(4);
+        for station in stations {
+            bench.fault(Member::Station(station), Action::Crash);
+        }
+        bench.pass(2);
+        for station in stations {
+            bench.simulation.lose_steps(station, 4);
+            bench.fault(Member::Station(station), Action::Restart);
+        }
+        bench.pass(100);
+        assert_eq!(bench.seen.warm_starts, 1);
+        let choice = StateChoice::Newest { cycle: None };
+        bench.fault(Member::RemoteIo(PROGRAM), Action::Choose { choice });
+        bench.seen.outputs = [None, None];
+        bench.pass(60);
+        assert_eq!(bench.seen.warm_starts, 2);
+        assert_eq!((bench.count(), bench.echo()), (1.0, -4.0));
+    }
 }
 
 /// A fault and its repair, with the cycles between.

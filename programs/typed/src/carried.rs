@@ -199,21 +199,25 @@ impl Successor {
 
 impl Points {
     /// Puts the values of points before into an image of these, by name and type: of those in `names`, and not where the type or the subrange of the
-    /// point does not have the value.
+    /// point does not have the value. Answers with those of `names` whose values are in no point.
     ///
     /// # Panics
     /// If an image is narrower than its points.
-    pub fn carry(&self, image: &mut [u64], before: (&Self, &[u64]), names: &[String]) {
+    pub fn carry<'n>(
+        &self,
+        image: &mut [u64],
+        before: (&Self, &[u64]),
+        names: &'n [String],
+    ) -> Vec<&'n str> {
         let (points, values) = before;
-        for point in self.iter().filter(|point| names.contains(&point.name)) {
-            let value = points.find(&point.name).and_then(|old| {
-                let value = types::converted(old.of, point.of, old.get(values))?;
-                Some(value).filter(|value| point.declared().contains(*value))
-            });
-            if let Some(value) = value {
-                point.set(image, value);
-            }
-        }
+        let mut carry = |name: &str| {
+            let (point, old) = (self.find(name)?, points.find(name)?);
+            let value = types::converted(old.of, point.of, old.get(values))?;
+            let value = Some(value).filter(|value| point.declared().contains(*value))?;
+            point.set(image, value);
+            Some(())
+        };
+        names.iter().map(String::as_str).filter(|name| carry(name).is_none()).collect()
     }
 }
 

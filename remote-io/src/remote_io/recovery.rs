@@ -296,6 +296,10 @@ impl RemoteIo {
         }
         let void = self.writing.lose(&self.settings.operator_inputs, moment, |_| true);
         self.report_void(&void);
+        let is_first = matches!(self.knowledge, Knowledge::Listening { .. });
+        if state.is_none() && is_first {
+            self.take_up_writes();
+        }
         self.question = None;
         self.note_begin(state.is_none().then_some(history.born()));
         let adopted =

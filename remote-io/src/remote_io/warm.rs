@@ -310,11 +310,17 @@ impl RemoteIo {
         let start = Lineage::warm(program, moment, kept.holding.lineage);
         let capacity = self.settings.agreement.history;
         let history = History::from(moment, (Some(program), start), capacity);
-        let width = self.settings.undriven.width();
-        let note = self.noting.found.clone().filter(|note| note.recalled.inputs.width() == width);
         self.sample_from(moment, history, None);
-        if let Some(note) = note {
-            self.writing.start_warm(&self.settings.operator_inputs, &note.recalled);
+    }
+
+    /// At the first start of this life, warm or cold: takes up the operator inputs that keep their values over a power failure, and the writes that
+    /// were in effect.
+    pub(super) fn take_up_writes(&mut self) {
+        let width = self.settings.undriven.width();
+        let last = self.noting.last.as_ref();
+        let last = last.filter(|note| note.recalled.inputs.width() == width);
+        if let Some(note) = last {
+            self.writing.start(&self.settings.operator_inputs, &note.recalled);
         }
     }
 }

@@ -351,7 +351,7 @@ impl Writing {
 
 impl Writing {
     /// After a power failure: takes up the writes that were in effect, and the values of the inputs that keep theirs.
-    pub(super) fn start_warm(&mut self, inputs: &[OperatorInput], recalled: &Recalled) {
+    pub(super) fn start(&mut self, inputs: &[OperatorInput], recalled: &Recalled) {
         *self = Self::new(inputs);
         for (input, written) in inputs.iter().zip(&mut self.values) {
             let value = input.place.get(&recalled.inputs);

@@ -153,7 +153,9 @@ where
         let more = dropped.len().saturating_sub(LISTED_PATHS);
         dropped.truncate(LISTED_PATHS);
         let carried = HostEvent::RetainedCarried { program: program.clone(), kept, converted, new };
-        sink.record(clock.now(), Noted::Host(carried));
+        if kept + converted + new > 0 {
+            sink.record(clock.now(), Noted::Host(carried));
+        }
         if !dropped.is_empty() {
             let dropped = HostEvent::RetainedDropped { program, paths: dropped, more };
             sink.record(clock.now(), Noted::Host(dropped));

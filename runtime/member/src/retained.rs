@@ -119,7 +119,8 @@ pub(crate) fn retained_notes(
     let input_at = |bit: u16| inputs.iter().find(|point| point.bit == u32::from(bit));
     let retained = settings.operator_inputs.iter().filter(|input| input.retains);
     let retained = retained.filter_map(|input| Some(input_at(input.place.bit)?.name.clone()));
-    let kept = RetainedProgram { inputs: retained.collect(), ..code.source().kept(hash) };
+    let retained: Vec<String> = retained.collect();
+    let kept = RetainedProgram { inputs: retained.clone(), ..code.source().kept(hash) };
     let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name()));
     let files = files.with_program(kept).with_authority(owner.authority);
     let mut notes = files.notes(Some(owner));
@@ -134,6 +135,13 @@ pub(crate) fn retained_notes(
         // The file has the name of this remote I/O: with other controllers before it, its program had another number.
         note.recalled.program = program;
     }
+    let mut carried = CarriedOver {
+        program: cluster.controllers()[program.index()].name.clone(),
+        kept: 0,
+        converted: 0,
+        new: 0,
+        dropped: Vec::new(),
+    };
     if let Some(note) =
         notes.newest.as_mut().filter(|note| note.hash != hash && !is_loaded(program, note.hash))
     {
@@ -151,9 +159,18 @@ pub(crate) fn retained_notes(
                     }
                 }
                 let noted = &note.recalled.inputs;
-                if noted.width() == old.width() {
-                    inputs.carry(image.words_mut(), (&old, noted.words()), &kept.inputs);
-                }
+                let before = (&old, noted.words());
+                let names = &kept.inputs;
+                let lost = if noted.width() == old.width() {
+                    inputs.carry(image.words_mut(), before, names)
+                } else {
+                    names.iter().map(String::as_str).collect()
+                };
+                let is_lost =
+                    |name: &&String| lost.contains(&name.as_str()) || !retained.contains(*name);
+                carried.dropped.extend(names.iter().filter(is_lost).cloned());
+                carried.kept = names.len() - carried.dropped.len();
+                carried.new = retained.iter().filter(|name| !names.contains(name)).count();
                 note.recalled.inputs = image;
             }
             Err(problem) => {
@@ -164,8 +181,23 @@ pub(crate) fn retained_notes(
             }
         }
     }
+    if let Some(note) = notes
+        .newest
+        .as_ref()
+        .filter(|note| note.recalled.inputs.width() == settings.undriven.width())
+    {
+        let is_outside = |input: &&understudy_remote_io::OperatorInput| {
+            input.retains && !input.admits(input.place.get(&note.recalled.inputs))
+        };
+        let outside = settings.operator_inputs.iter().filter(is_outside);
+        let outside = outside.filter_map(|input| Some(input_at(input.place.bit)?.name.clone()));
+        carried.dropped.extend(outside);
+    }
+    let is_told = carried.kept + carried.new + carried.dropped.len() > 0;
+    let carried = is_told.then_some(carried).into_iter().collect();
     let found = std::mem::take(&mut notes.files);
-    let retention = Retention { files: vec![(None, files)], found, ..Retention::default() };
+    let retention =
+        Retention { files: vec![(None, files)], found, carried, ..Retention::default() };
     (notes, retention)
 }
 

@@ -221,7 +221,7 @@ fn started_warm_text(
         None => format!("cycle {} of the cluster", retained.cycle.0),
     };
     let lost = match lost {
-        Some(0) => "no cycle with applied outputs is lost".to_owned(),
+        Some(0) => "no cycle with applied outputs is lost, as far as it has noted them".to_owned(),
         Some(1) => "the retentive values of 1 cycle with applied outputs are lost".to_owned(),
         Some(lost) => {
             format!("the retentive values of {lost} cycles with applied outputs are lost")
