@@ -133,6 +133,9 @@ pub enum Event {
         holder: Option<StationId>,
         /// Whether the operator is asked; the program starts cold otherwise.
         asks: bool,
+        /// Why the program does not go on from the newest state by itself.
+        #[serde(default, skip_serializing_if = "AskReason::is_doubt")]
+        reason: AskReason,
     },
     /// A station has returned that can prove the state, which was lost or disputed: the program continues.
     StateRecovered {
@@ -414,6 +417,25 @@ pub struct Lacking {
     /// Reason.
     #[serde(flatten)]
     pub reason: LackingReason,
+}
+
+/// Why a program does not go on from the newest state by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AskReason {
+    /// A newer state was applied, or may have been, or no station has a state.
+    #[default]
+    Doubt,
+    /// Values that were kept over a power failure are not in it, or it was kept under other names or keys.
+    NotWhole,
+    /// It is as new as the newest applied output, and the operator chooses each start: `restart = "operator"`.
+    Configured,
+}
+
+impl AskReason {
+    fn is_doubt(&self) -> bool {
+        *self == Self::Doubt
+    }
 }
 
 /// Reason why a station cannot prove the output of a program.

@@ -238,6 +238,7 @@ fn a_renamed_variable_is_a_question() {
     ));
     let asked = plant.wait_for("counter-io", is("state-lost"));
     assert_eq!(asked["asks"], true, "{asked}");
+    assert_eq!(asked["reason"], "not-whole", "{asked}");
     for station in ["counter", "understudy"] {
         let dropped = plant.wait_for(station, is("retained-dropped"));
         assert_eq!(dropped["paths"], serde_json::json!(["hours"]), "{dropped}");
@@ -465,6 +466,13 @@ fn a_setpoint_keeps_its_value_when_the_program_has_changed() {
     plant.start(&program("offset, limit", "limit + 100 * offset"));
     plant.wait_for("counter-io", is("started-warm"));
     assert_eq!(plant.applied(16, |_| true), 342);
+    // The value is outside the limits of the next one, whose name stays: it is said, and the initial value is sampled.
+    plant.kill();
+    plant.inputs = inputs(&(setpoint("offset", 3) + &setpoint("limit", 5).replace("100", "20")));
+    plant.start(&program("offset, limit", "limit + 100 * offset"));
+    let dropped = plant.wait_for("counter-io", is("retained-dropped"));
+    assert_eq!(dropped["paths"], serde_json::json!(["limit"]), "{dropped}");
+    assert_eq!(plant.applied(16, |_| true), 305);
 }
 
 /// What `check` says of the bytes that a station writes in a day is what it writes, at most.

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use understudy_cluster::read;
 use understudy_cycle::RemoteIoInput;
-use understudy_remote_io::Event;
+use understudy_remote_io::{AskReason, Event};
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, parts};
 use understudy_testing::COUNTER;
 use understudy_wire::{Image, Member, Moment, ProgramId, Source, StateChoice, StationId};
@@ -48,6 +48,7 @@ struct Seen {
     /// States that the warm starts were from.
     from: Vec<Moment>,
     refused: u32,
+    reasons: Vec<AskReason>,
     asked: u32,
     held: u32,
 }
@@ -67,7 +68,8 @@ impl Seen {
                 self.warm.push(*lost);
                 self.from.push(*retained);
             }
-            Event::StateLost { asks: true, newest, holder, .. } => {
+            Event::StateLost { asks: true, newest, holder, reason, .. } => {
+                self.reasons.push(*reason);
                 self.asked += 1;
                 self.offered.extend(newest.map(|newest| (*holder, newest)));
             }
@@ -151,6 +153,7 @@ fn a_retained_state_before_the_newest_applied_one_is_the_operators_choice() {
     }
     let asked = run(&mut simulation, 100);
     assert_eq!((asked.asked, asked.applied.len(), asked.warm.len()), (1, 0, 0), "{asked:?}");
+    assert_eq!(asked.reasons, [AskReason::Doubt]);
     let choice = StateChoice::Newest { cycle: None };
     simulation.schedule(fault((0, 0.0), REMOTE_IO, Action::Choose { choice }));
     let after = run(&mut simulation, 100);
@@ -171,6 +174,8 @@ fn the_start_after_a_power_failure_is_as_configured() {
         assert_eq!((seen.cold.len(), seen.warm.len(), seen.asked), (cold, 0, asked), "{restart}");
         // A cold start that is configured loses nothing that was to be kept.
         assert_eq!(seen.cold.last(), Some(&None), "{restart}");
+        // Nor does a question that is configured.
+        assert!(seen.reasons.iter().all(|reason| *reason == AskReason::Configured), "{restart}");
     }
 }
 

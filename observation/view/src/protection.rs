@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_remote_io::AskReason;
 
 /// Protection of a program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -41,6 +42,20 @@ pub struct LostState {
     pub age_cycles: Option<u64>,
     /// Whether the operator is asked.
     pub asks: bool,
+    /// Why the program does not start by itself from a state that is not lost: its values or names have changed, or the cluster file says so.
+    pub reason: Option<&'static str>,
+}
+
+/// Why a program does not start by itself from a state that is not lost.
+pub(crate) fn asked_because(reason: AskReason) -> Option<&'static str> {
+    match reason {
+        AskReason::Doubt => None,
+        AskReason::NotWhole => Some(
+            "the newest state was kept by another program, or under other names or keys, and not all of it is taken over \
+             (retained-dropped, retained-refused)",
+        ),
+        AskReason::Configured => Some("restart = \"operator\" asks after each power failure"),
+    }
 }
 
 impl Protection {
@@ -60,15 +75,20 @@ impl LostState {
     pub fn text(&self) -> String {
         let age = self.age_cycles.map_or_else(String::new, |age| format!(", {age} cycles old"));
         let doubt = match self.age_cycles {
+            _ if self.reason.is_some() => "",
             Some(_) => "",
             None => "; whether outputs of a newer one were applied is not known",
         };
         let since = self.since;
+        let lost = match self.reason {
+            Some(reason) => format!("NOT STARTED since cycle {since}: {reason}"),
+            None => format!("STATE LOST since cycle {since}"),
+        };
         match (self.newest, &self.holder) {
             (Some(newest), Some(holder)) => format!(
-                "STATE LOST since cycle {since}: the newest available state is of cycle {newest} of the cluster{age}, in {holder}{doubt}"
+                "{lost}: the newest available state is of cycle {newest} of the cluster{age}, in {holder}{doubt}"
             ),
-            _ => format!("STATE LOST since cycle {since}: no station has a state of the program"),
+            _ => format!("{lost}: no station has a state of the program"),
         }
     }
 }

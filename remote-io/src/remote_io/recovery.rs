@@ -193,7 +193,8 @@ impl RemoteIo {
             || self.settings.restart == Some(Restart::Operator)
             || self.may_have_the_wrong_program();
         let (holder, newest) = newest.unzip();
-        let event = Event::StateLost { moment, applied, newest, holder, asks };
+        let reason = self.reason_to_ask();
+        let event = Event::StateLost { moment, applied, newest, holder, asks, reason };
         self.ask(Question::StateLost { newest }, event);
         if !asks {
             self.start_cold(moment, applied);

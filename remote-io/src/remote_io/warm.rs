@@ -23,7 +23,7 @@ use understudy_wire::{
 
 use super::recovery::Verdict;
 use super::{Authority, RemoteIo};
-use crate::event::Event;
+use crate::event::{AskReason, Event};
 use crate::history::History;
 use crate::settings::{Release, Restart};
 
@@ -257,6 +257,18 @@ impl RemoteIo {
                     _ => Verdict::Warm(from, *kept),
                 }
             }
+        }
+    }
+
+    /// Why the program does not go on by itself from the newest state that stations hold or have kept.
+    pub(super) fn reason_to_ask(&self) -> AskReason {
+        let retained = self.newest_retained().filter(|_| self.holders.newest().is_none());
+        match (retained, self.settings.restart) {
+            (Some((_, kept)), _) if !kept.is_whole => AskReason::NotWhole,
+            (Some((_, kept)), Some(Restart::Operator)) if !self.is_before_applied(kept) => {
+                AskReason::Configured
+            }
+            _ => AskReason::Doubt,
         }
     }
 

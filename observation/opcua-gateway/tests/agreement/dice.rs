@@ -270,6 +270,7 @@ impl Dice<'_> {
                 newest: Some(moment),
                 holder: Some(station),
                 asks: true,
+                reason: Default::default(),
             },
             7 => RemoteIoEvent::StateRecovered { moment, from: station },
             8 => RemoteIoEvent::StartedCold { born: moment, awaits_release: true, lost: None },

@@ -3,13 +3,14 @@
 use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
-use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
+use understudy_remote_io::{AskReason, Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
 use understudy_wire::{
     Configurations, Member, Moment, Part, ProgramSet, SignalPlace, StationId, StationSet, Word,
 };
 
 use super::signals::Names;
 use super::{Words, list, program_name, programs, source_text, stations};
+use crate::protection::asked_because;
 
 descriptions! { station: StationEvent, members: Members;
     Published { words, .. } => "published" Info format!("publishes {}", words_text(words, members));
@@ -86,8 +87,8 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         "its program does not start: {others} members of the cluster have another configuration, and only {stations} stations have its own; \
          correct the configuration, or order a cold start"
     );
-    StateLost { applied, newest, holder, asks, .. } => "state-lost" Alarm
-        state_lost_text(*applied, newest.zip(*holder).map(|(newest, holder)| (newest, name(holder, members))), *asks);
+    StateLost { applied, newest, holder, asks, reason, .. } => "state-lost" Alarm
+        state_lost_text(*applied, newest.zip(*holder).map(|(newest, holder)| (newest, name(holder, members))), *asks, *reason);
     StateRecovered { from, .. } => "state-recovered" Notice
         format!("{} has returned with the state of its program", name(*from, members));
     ChoiceRefused { refusal, .. } => "choice-refused" Warning format!("refuses the operator's choice: {refusal}");
@@ -235,7 +236,12 @@ fn started_warm_text(
 }
 
 /// `newest` is the newest available state, with the station that has it.
-fn state_lost_text(applied: Option<Moment>, newest: Option<(Moment, &str)>, asks: bool) -> String {
+fn state_lost_text(
+    applied: Option<Moment>,
+    newest: Option<(Moment, &str)>,
+    asks: bool,
+    reason: AskReason,
+) -> String {
     let behind = applied.map_or_else(
         || "it is not known whether newer outputs were applied".to_owned(),
         |applied| {
@@ -261,7 +267,12 @@ fn state_lost_text(applied: Option<Moment>, newest: Option<(Moment, &str)>, asks
         ),
         None => "no station has one that can be used, and".to_owned(),
     };
-    format!("the state of its program is lost: {available} {behind}; {next}")
+    let lost = match asked_because(reason) {
+        None => "the state of its program is lost".to_owned(),
+        Some(reason) => format!("its program does not start by itself: {reason}"),
+    };
+    let separator = if reason == AskReason::Doubt { ":" } else { ";" };
+    format!("{lost}{separator} {available} {behind}; {next}")
 }
 
 fn value_fault_text(

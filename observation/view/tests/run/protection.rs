@@ -5,7 +5,7 @@ use std::sync::Arc;
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record, RunEvent};
 use understudy_node::Event as StationEvent;
-use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_remote_io::{AskReason, Event as RemoteIoEvent};
 use understudy_view::{
     Alarm, Bounds, LostState, Model, Protection, RemoteIoState, Snapshot, StationState,
 };
@@ -434,7 +434,8 @@ fn a_state_that_is_as_new_as_all_that_is_known_is_not_called_0_cycles_old() {
         let mut model = model(&cluster, &short, 1);
         let holder = Some(StationId(0));
         let (applied, newest) = (Some(moment), Some(newest));
-        let event = RemoteIoEvent::StateLost { moment, applied, newest, holder, asks: true };
+        let (asks, reason) = (true, AskReason::Doubt);
+        let event = RemoteIoEvent::StateLost { moment, applied, newest, holder, asks, reason };
         model.note(&Record { event: Happening::RemoteIo(event), ..last.clone() });
         let alarm = model.alarms().find(|alarm| alarm.alarm == "state-lost").expect("an alarm");
         let doubts =

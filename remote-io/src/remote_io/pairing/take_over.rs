@@ -4,7 +4,7 @@ use understudy_wire::{Part, Time};
 
 use super::super::{Deadline, Question, RemoteIo};
 use super::{FIRST_LOSS_TIME, IDLE_PATIENCE, LOSS_PATIENCE, LOSS_TIME, Pairing, Report};
-use crate::event::Event;
+use crate::event::{AskReason, Event};
 
 impl RemoteIo {
     /// A cycle has begun: asks the other one for the promise that it does not begin.
@@ -119,6 +119,7 @@ impl RemoteIo {
         let newest = self.holders.newest().map(|(from, holding)| (from, holding.stepped));
         let (holder, newest) = newest.unzip();
         self.question = Some(Question::StateLost { newest });
-        self.report(Event::StateLost { moment, applied, newest, holder, asks: true });
+        let (asks, reason) = (true, AskReason::Doubt);
+        self.report(Event::StateLost { moment, applied, newest, holder, asks, reason });
     }
 }
