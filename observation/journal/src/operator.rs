@@ -149,7 +149,7 @@ pub enum Refusal {
     Alarm(AlarmRefusal),
     /// The outcome of a write is not known yet.
     #[error(
-        "U0648: the outcome of the write is not known: the value may be in effect; check the state of the program"
+        "U0648: the outcome of the write is not known: the value may be in effect, or takes effect with the next applied outputs, such as after their release; check the state of the program"
     )]
     Undecided,
     /// Another process writes the run, and says why.

@@ -104,7 +104,7 @@ pub enum SpareState {
     Waking,
     /// It publishes in a group.
     Serving,
-    /// No member receives its reports: it may not wake.
+    /// No member receives its reports, or its station in a group is not received any more.
     NotReceived,
 }
 
@@ -194,22 +194,29 @@ fn spare_overview(plant: &PlantFile, spare: &PlantSpare, views: &[GroupView]) ->
             Some(_) => places.push((SpareState::Waking, serves.group)),
         }
         match snapshot.spares.iter().find(|it| it.name == spare.name && it.received) {
-            Some(report) => received.push(report.serves.clone()),
+            Some(report) => {
+                // It was flagged after the spare had reported to be awake: it does not wake, but has failed.
+                let has_failed = report.flagged_slots.contains(&serves.name);
+                received.push((report.serves.clone(), has_failed));
+            }
             None => not_received_in.push(name(serves.group)),
         }
     }
     // The station of a slot publishes or joins: that counts more than a report, which is some seconds old.
     let place = places.iter().find(|(state, _)| *state == SpareState::Serving).or(places.first());
-    let reported = received.iter().flatten().max();
+    let reported =
+        received.iter().filter_map(|(group, has_failed)| Some((group.as_ref()?, *has_failed)));
+    let reported = reported.max();
     let (state, group) = match (place, reported) {
         (Some((state, group)), _) => (*state, Some(name(*group))),
         (None, _) if received.is_empty() => (SpareState::NotReceived, None),
-        (None, Some(group)) if is_missing(plant, spare, group, views) => {
-            (SpareState::Waking, Some(group.clone()))
+        (None, Some((group, has_failed))) if is_missing(plant, spare, group, views) => {
+            let state = if has_failed { SpareState::NotReceived } else { SpareState::Waking };
+            (state, Some(group.clone()))
         }
         (None, _) => (SpareState::Asleep, None),
     };
-    if state == SpareState::NotReceived {
+    if state == SpareState::NotReceived && group.is_none() {
         not_received_in.clear();
     }
     SpareOverview { name: spare.name.clone(), state, group, not_received_in }
@@ -319,7 +326,10 @@ fn no_spare(
         let is_unread = slot.is_some_and(|slot| slot.link.detached);
         reasons.push(match (known.state, &known.group) {
             _ if !serves.fits => format!("the group is too large for {name}"),
-            (SpareState::NotReceived, _) => format!("{name} is not received"),
+            (SpareState::NotReceived, Some(at)) => {
+                format!("{name} has served {at}, and its station there is not received any more")
+            }
+            (SpareState::NotReceived, None) => format!("{name} is not received"),
             (SpareState::Waking, Some(at)) if *at == own.name => format!("{name} is waking"),
             (SpareState::Serving, Some(at)) if *at == own.name && is_unread => format!(
                 "{name} serves it, and its station is not received here: what it protects is not known"
@@ -366,12 +376,16 @@ fn alarms(groups: &[GroupOverview], spares: &[SpareOverview]) -> Vec<PlantAlarm>
     });
     let of_spares = spares.iter().filter_map(|spare| {
         let name = &spare.name;
-        let text = match (spare.state, spare.not_received_in.as_slice()) {
-            (SpareState::NotReceived, _) => {
+        let lost_in = spare.group.as_ref().filter(|_| spare.state == SpareState::NotReceived);
+        let text = match (lost_in, spare.not_received_in.as_slice()) {
+            (Some(group), _) => {
+                format!("{name} has served {group}, and its station there is not received any more")
+            }
+            (None, _) if spare.state == SpareState::NotReceived => {
                 format!("{name} is not received by any group: it may not wake")
             }
-            (_, []) => return None,
-            (_, groups) => {
+            (None, []) => return None,
+            (None, groups) => {
                 format!("{name} is not received in {}: it may not wake there", groups.join(", "))
             }
         };

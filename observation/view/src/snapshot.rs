@@ -416,6 +416,8 @@ pub struct SpareSnapshot {
     pub received: bool,
     /// The group in which it is awake, as it reports.
     pub serves: Option<String>,
+    /// Slots that were flagged since it has reported that.
+    pub flagged_slots: Vec<String>,
 }
 
 /// Times of one cycle, in microseconds.

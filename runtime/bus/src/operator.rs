@@ -386,8 +386,8 @@ fn tell(text: &str, gaps: &mut Gaps, take: &mut impl FnMut(Told<'_>) -> bool) ->
 pub(crate) fn not_opened(address: SocketAddr, error: &zenoh::Error) -> String {
     tracing::debug!(%error, %address, "no TLS connection");
     match TcpStream::connect_timeout(&address, REACH) {
-        Ok(_) => "it listens there, and one side refuses the certificate of the other: it is of another authority or revoked, \
-                  or the clock of one machine is outside its validity; compare `date -u` on both machines with \
+        Ok(_) => "it listens there, and no TLS connection was opened: it has just started or is busy, or, if this lasts, one side refuses the certificate of \
+                  the other: that is of another authority or revoked, or the clock of one machine is outside its validity; compare `date -u` on both machines with \
                   `understudy keys list`"
             .to_owned(),
         Err(source) => match source.kind() {

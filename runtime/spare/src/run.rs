@@ -96,10 +96,9 @@ pub enum Report {
     Awake {
         /// The group.
         group: String,
-        /// Cycles since the spare woke.
-        cycles: u32,
-        /// Cycles since the last turn of the station that failed first.
-        since_failure: u32,
+        /// Cycles since the spare woke, and since the last turn of the station that failed first; nothing where it has woken again, because it had
+        /// not followed the group before.
+        cycles: Option<(u32, u32)>,
     },
     /// The group is complete: the spare retires.
     Retires {
@@ -134,10 +133,11 @@ impl fmt::Display for Report {
             Self::WakesAgain { group, slot } => {
                 write!(formatter, "{group}: wakes as {slot}, as it was when it ended")
             }
-            Self::Awake { group, cycles, since_failure } => write!(
+            Self::Awake { group, cycles: Some((cycles, since_failure)) } => write!(
                 formatter,
                 "{group}: publishes {cycles} cycles after it woke, {since_failure} after the failure"
             ),
+            Self::Awake { group, cycles: None } => write!(formatter, "{group}: publishes"),
             Self::Retires { group, cycles } => {
                 write!(formatter, "{group}: retires, the group is complete for {cycles} cycles")
             }
@@ -152,8 +152,8 @@ impl fmt::Display for Report {
 struct Awake {
     group: usize,
     post: Post,
-    /// Cycles for which a station had been flagged when it woke.
-    silent: u32,
+    /// Cycles for which a station had been flagged when it woke; nothing where it woke before it followed the group.
+    silent: Option<u32>,
     publishes: bool,
 }
 
@@ -280,8 +280,10 @@ impl Keeper<'_> {
             if !awake.publishes && standings[awake.group].publishes {
                 awake.publishes = true;
                 let since_failure = silent(&self.groups[awake.group]);
-                let cycles = since_failure.saturating_sub(awake.silent);
-                say(&Report::Awake { group: duty.group.clone(), cycles, since_failure });
+                let cycles = awake
+                    .silent
+                    .map(|silent| (since_failure.saturating_sub(silent), since_failure));
+                say(&Report::Awake { group: duty.group.clone(), cycles });
             }
         }
         let post = self.awake.as_ref().map(|awake| awake.group);
@@ -329,7 +331,8 @@ impl Keeper<'_> {
             Ok(post) => {
                 self.woke += 1;
                 self.whereabouts.set(Some(duty.group.clone()));
-                let silent = silent(&self.groups[group]);
+                let attention = &self.groups[group];
+                let silent = attention.standing().seen.then(|| silent(attention));
                 self.awake = Some(Awake { group, post, silent, publishes: false });
             }
             Err(error) => {

@@ -171,6 +171,7 @@ impl Model {
                 None
             }
             RemoteIoEvent::Flagged { station, .. } => {
+                self.slot_flagged(*station, cycle);
                 let flagged = StationChange::Flagged(program);
                 Some(Change::Station(*station, flagged))
             }

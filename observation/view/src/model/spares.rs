@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use understudy_bus::HostEvent;
-use understudy_wire::Member;
+use understudy_wire::{Member, StationId};
 
 use super::{Model, Standing};
 use crate::snapshot::SpareSnapshot;
@@ -18,32 +18,41 @@ const SPARE_LOST: &str = "spare-lost";
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Report {
     /// It receives its reports.
-    Received { serves: Option<String> },
+    Received {
+        serves: Option<String>,
+        /// The cycle in which that was new.
+        since: i64,
+    },
     /// It does not receive them any more.
     Lost,
 }
 
-/// By spare: what each member says of it.
+/// What is known of the spares.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Spares(BTreeMap<String, BTreeMap<Member, Report>>);
+pub(super) struct Spares {
+    /// By spare: what each member says of it.
+    reports: BTreeMap<String, BTreeMap<Member, Report>>,
+    /// The cycle in which a slot was flagged last.
+    flagged: BTreeMap<StationId, i64>,
+}
 
 impl Model {
     pub(super) fn spare_reported(&mut self, member: Member, cycle: i64, event: &HostEvent) {
         let (spare, report) = match event {
             HostEvent::SpareReceived { spare, serves } => {
-                (spare, Report::Received { serves: serves.clone() })
+                (spare, Report::Received { serves: serves.clone(), since: cycle })
             }
             HostEvent::SpareLost { spare } => (spare, Report::Lost),
             // A new process knows of no spare yet.
             HostEvent::Ready { .. } => {
-                self.spares.0.values_mut().for_each(|reports| {
+                self.spares.reports.values_mut().for_each(|reports| {
                     reports.remove(&member);
                 });
                 return;
             }
             _ => return,
         };
-        let reports = self.spares.0.entry(spare.clone()).or_default();
+        let reports = self.spares.reports.entry(spare.clone()).or_default();
         reports.insert(member, report);
         let is_lost = reports.values().all(|report| *report == Report::Lost);
         let subject = (spare.clone(), SPARE_LOST);
@@ -55,22 +64,35 @@ impl Model {
         }
     }
 
+    /// A remote I/O has flagged a station.
+    pub(super) fn slot_flagged(&mut self, station: StationId, cycle: i64) {
+        if self.cluster.agreement().schedule.spare_slots().contains(station) {
+            self.spares.flagged.insert(station, cycle);
+        }
+    }
+
     /// The spares that have reported, as the members know it that report themselves.
     pub(crate) fn spares_in(&self, standing: &Standing) -> Vec<SpareSnapshot> {
-        let spares = self.spares.0.iter();
+        let spares = self.spares.reports.iter();
         spares
             .map(|(name, reports)| {
                 let present = reports.iter().filter(|(member, _)| standing.reports(**member));
                 let received = present.filter_map(|(_, report)| match report {
-                    Report::Received { serves } => Some(serves.clone()),
+                    Report::Received { serves, since } => Some((serves.clone(), *since)),
                     Report::Lost => None,
                 });
                 // Of several members the one that knows of a group has the newer report, or will have it within seconds.
-                let received = received.max();
+                let received = received.max_by(|one, other| one.0.cmp(&other.0));
                 SpareSnapshot {
                     name: name.clone(),
                     received: received.is_some(),
-                    serves: received.flatten(),
+                    flagged_slots: received.as_ref().map_or_else(Vec::new, |(_, since)| {
+                        let flagged = self.spares.flagged.iter().filter(|(_, at)| *at > since);
+                        flagged
+                            .map(|(slot, _)| self.members.name(Member::Station(*slot)).to_owned())
+                            .collect()
+                    }),
+                    serves: received.and_then(|(serves, _)| serves),
                 }
             })
             .collect()

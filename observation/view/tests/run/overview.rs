@@ -74,6 +74,7 @@ fn group(name: &str, failed: &[&str], spare: StationState, reports: Option<&str>
             name: "spare-1".to_owned(),
             received: true,
             serves: (!group.is_empty()).then(|| group.to_owned()),
+            flagged_slots: Vec::new(),
         })
         .into_iter()
         .collect();
@@ -113,6 +114,20 @@ fn the_overview_says_which_group_is_unprotected_and_where_the_spare_is() {
         [group("line-1", &["robot"], Joining, Some("line-1")), calm("line-2")],
         (SpareState::Waking, Some("line-1")),
         &["line-1 is UNPROTECTED (failed: robot): spare-1 is waking"],
+    );
+    // The machine of the spare has failed while it served: its last report is some seconds old.
+    let GroupView::Present(mut failed) = group("line-1", &["robot"], Standby, Some("line-1"))
+    else {
+        unreachable!("it is present")
+    };
+    failed.spares[0].flagged_slots.push("spare".to_owned());
+    check(
+        [GroupView::Present(failed), calm("line-2")],
+        (SpareState::NotReceived, Some("line-1")),
+        &[
+            "line-1 is UNPROTECTED (failed: robot): spare-1 has served line-1, and its station there is not received any more",
+            "spare-1 has served line-1, and its station there is not received any more",
+        ],
     );
     let served = || group("line-1", &["robot"], Publishing, Some("line-1"));
     check([served(), calm("line-2")], (SpareState::Serving, Some("line-1")), &[]);
