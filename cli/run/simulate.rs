@@ -7,6 +7,7 @@ use clap::Args;
 use understudy_journal::{
     JOURNAL_LIMIT_BYTES, Journal, JournalState, Record, RunDirectory, RunEvent, keep_cluster,
 };
+use understudy_processes::simulated_only;
 use understudy_scenarios::{Summary, World, simulate as run_simulation, write_results};
 
 use crate::answer::{Answer, Status};
@@ -87,6 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     answer.text = format!("seed {seed}\n{}", answer.text);
     let cluster = &arguments.cluster;
     answer = match &arguments.scenario {
+        Some(_) if !simulated_only(&scenario).is_empty() => answer,
         Some(scenario) => answer.and_next(&[&"lab", cluster, &"--scenario", scenario]),
         None => answer.and_next(&[&"lab", cluster]),
     };

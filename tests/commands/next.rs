@@ -49,6 +49,14 @@ fn the_next_steps_of_a_command_are_commands_that_run() {
     let other = empty_folder("next_ladder");
     fs::copy(folder.join("tank.xml"), other.join("tank.xml")).expect("copied");
     assert_eq!(follow(&other, &["check", "tank.xml"], lab), 2);
+    // Processes have no spare that wakes by its rule.
+    fs::write(folder.join("spare.toml"), "title = \"spare\"\ncycles = 50\nspare_after = 20\n")
+        .expect("it is ours");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let line = root.join("examples/shared-spare/line-1/cluster.toml");
+    let line = line.to_str().expect("a path");
+    let simulate = ["simulate", line, "--scenario", "spare.toml", "--seed", "1"];
+    assert_eq!(follow(&folder, &simulate, lab), 1);
     let campaign = ["campaign", cluster, "--runs", "2", "--seed", "1", "--jobs", "1"];
     assert_eq!(follow(&folder, &campaign, &["model-check"]), 1);
 }

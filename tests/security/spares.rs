@@ -216,6 +216,16 @@ fn a_spare_masks_the_second_failure_and_retires_when_the_station_is_back() {
     plant.slot_is_taken("line-1", false);
     until(&|| plant.folder.join("kept/line-1.spare.awake").exists(), &|awake| !awake);
     passes(&groups[0], "robot-io", 20);
+    // Its slot has been flagged since, which is no fault.
+    let journal = || fs::read_to_string(groups[0].journal("robot-io")).unwrap_or_default();
+    let is_slot =
+        |line: &str| line.contains(r#""event":"flagged""#) && line.contains(r#""station":3"#);
+    until(&|| journal().lines().any(is_slot), &|flagged| *flagged);
+    let desk_of_it = plant.folder.join("desk/line-1");
+    let of_it = ["--name", "robot-io", "--keys", text(&desk_of_it), "status"];
+    let status = understudy(&["operate", text(&groups[0].cluster)]).args(of_it).output();
+    let status = String::from_utf8(status.expect("it runs").stdout).expect("a text");
+    assert!(status.contains("protected:") && !status.contains("flagged"), "{status}");
     // It is free for the other group. Its station ends with it, whether it is ended in order or killed.
     groups[1].signal("understudy", Signal::SIGKILL);
     plant.reported("line-2: publishes");

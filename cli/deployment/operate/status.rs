@@ -69,7 +69,10 @@ pub(super) fn ask(call: &Call, cluster: &Cluster, name: &str) -> Result<Answer, 
         wants_more && started.elapsed() < PATIENCE
     });
     let all = std::mem::take(&mut present.in_effect);
+    let slots = cluster.agreement().schedule.spare_slots();
     present.in_effect = records_not_over(all);
+    // The slot of a spare that sleeps is empty, as it should be.
+    present.in_effect.retain(|record| record.flagged().is_none_or(|of| !slots.contains(of)));
     let mut result: Value =
         serde_json::from_str(&ready).unwrap_or_else(|_| json!({ "text": ready }));
     let mut lines = Vec::new();

@@ -183,7 +183,10 @@ fn run(
     conductor: &mut dyn Conductor,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
-    refuse_what_is_simulated(scenario)?;
+    let words = simulated_only(scenario);
+    if !words.is_empty() {
+        return Err(LaboratoryError::OnlySimulated { words });
+    }
     let system = |what| move |source| LaboratoryError::System { what, source };
     let site = Site::prepare(cluster, scenario, &settings, directory)?;
     keep_cluster(directory.path(), &settings.cluster_file, cluster)
@@ -227,8 +230,8 @@ fn run(
     Ok(runtime.block_on(laboratory.run(receiver, commands)))
 }
 
-/// A process has no way to do some of what a simulation can.
-fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> {
+/// What of a scenario a process has no way to do, and a simulation has.
+pub fn simulated_only(scenario: &Scenario) -> Vec<&'static str> {
     let real = |action| {
         matches!(
             action,
@@ -257,11 +260,7 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
             "spares that wake by their rule (`understudy spare` does that beside processes)",
         );
     }
-    if words.is_empty() {
-        return Ok(());
-    }
-    let words = words.into_iter().collect();
-    Err(LaboratoryError::OnlySimulated { words })
+    words.into_iter().collect()
 }
 
 struct Laboratory<'w> {

@@ -9,7 +9,7 @@ use serde_json::value::RawValue;
 use understudy_bus::{HostEvent, RefusedOrder};
 use understudy_cluster::ChangeTexts;
 use understudy_simulator::Action;
-use understudy_wire::{Member, Moment};
+use understudy_wire::{Member, Moment, StationId};
 
 use crate::continuation::Continuation;
 use crate::members::Members;
@@ -165,6 +165,17 @@ impl Record {
     /// Record of a member.
     pub fn of_member(at_ns: u64, member: Member, members: &Members, event: Happening) -> Self {
         Self { at_ns, name: members.name(member).to_owned(), member: Some(member), event }
+    }
+
+    /// The station that the member has flagged, as the record says.
+    pub fn flagged(&self) -> Option<StationId> {
+        match &self.event {
+            Happening::Station(understudy_node::Event::Flagged { station, .. })
+            | Happening::RemoteIo(understudy_remote_io::Event::Flagged { station, .. }) => {
+                Some(*station)
+            }
+            _ => None,
+        }
     }
 }
 
