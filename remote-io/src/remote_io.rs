@@ -147,8 +147,13 @@ enum Deadline {
 enum Question {
     /// Which of several states of one cycle the program continues from.
     Disputed,
-    /// Whether the program continues from a stale state, the newest one, or cold.
-    StateLost { newest: Option<Moment> },
+    /// Whether the program continues from a stale state, or cold.
+    StateLost {
+        /// The newest one, as it was reported.
+        told: Option<Moment>,
+        /// The newest one in the last cycle.
+        newest: Option<Moment>,
+    },
     /// Whether the program starts cold, although members of the cluster have another configuration.
     ConfigurationDisputed,
 }

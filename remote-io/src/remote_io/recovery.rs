@@ -185,17 +185,24 @@ impl RemoteIo {
     }
 
     /// The state that the newest applied output came from is lost; `newest` is the newest one that a station has, held or retained. It is reported again
-    /// where another one has become the newest, which the operator would choose.
+    /// where another one has become the newest, which the operator would choose; not while that changes from cycle to cycle, because another author
+    /// drives the stations.
     fn lose_state(&mut self, moment: Moment, newest: Option<(StationId, Moment)>) {
+        let (holder, newest) = newest.unzip();
+        if let Some(Question::StateLost { told, newest: last }) = self.question
+            && (told == newest || last != newest)
+        {
+            self.question = Some(Question::StateLost { told, newest });
+            return;
+        }
         let applied = self.newest_applied().or_else(|| self.applied_of_another());
         let asks = self.asks_for_lost_state()
             || self.settings.stale_state == StaleState::Operator
             || self.settings.restart == Some(Restart::Operator)
             || self.may_have_the_wrong_program();
-        let (holder, newest) = newest.unzip();
         let reason = self.reason_to_ask();
-        let event = Event::StateLost { moment, applied, newest, holder, asks, reason };
-        self.ask(Question::StateLost { newest }, event);
+        self.question = Some(Question::StateLost { told: newest, newest });
+        self.report(Event::StateLost { moment, applied, newest, holder, asks, reason });
         if !asks {
             self.start_cold(moment, applied);
         }

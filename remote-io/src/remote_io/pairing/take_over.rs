@@ -118,7 +118,7 @@ impl RemoteIo {
         let (moment, applied) = (self.moment(), self.newest_applied());
         let newest = self.holders.newest().map(|(from, holding)| (from, holding.stepped));
         let (holder, newest) = newest.unzip();
-        self.question = Some(Question::StateLost { newest });
+        self.question = Some(Question::StateLost { told: newest, newest });
         let (asks, reason) = (true, AskReason::Doubt);
         self.report(Event::StateLost { moment, applied, newest, holder, asks, reason });
     }
