@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
-use understudy_typed::{CarriedPath, Fate, Successor};
+use understudy_typed::{CarriedPath, Fate, Fault, Program as TypedProgram, Successor};
 use understudy_wire::{ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
 use crate::cluster::Cluster;
@@ -350,6 +350,15 @@ impl Between {
 impl Conversion for Between {
     fn convert(&self, state: &[u64]) -> Vec<u64> {
         self.to.changed(&self.from, state, &self.successor)
+    }
+
+    fn release(&self, state: &mut [u64], inputs: &[u64]) {
+        // Only programs on the register machine have a reset, and their state is that of the typed program.
+        let reset = self.to.typed().inputs.find(TypedProgram::RESET);
+        let reset = reset.filter(|point| point.slot == 0);
+        if reset.is_some_and(|reset| reset.get(inputs) != 0) {
+            Fault::clear(state);
+        }
     }
 }
 

@@ -30,6 +30,10 @@ pub struct Program {
 pub trait Conversion: Debug + Send + Sync {
     /// The state for the packed `state`: a function of both programs and of the state, so all stations compute the same.
     fn convert(&self, state: &[u64]) -> Vec<u64>;
+
+    /// Releases the program of a converted state that a fault has stopped, where `inputs`, those of the sample that changes the program, reset it: it
+    /// goes on with the values of before the scan of the fault, and not with the initial ones.
+    fn release(&self, state: &mut [u64], inputs: &[u64]);
 }
 
 /// One program that a change replaces, with the way there and back.
@@ -111,14 +115,22 @@ impl<'a> Versions<'a> {
         self.first.executable.input_count()
     }
 
-    /// The first state of `to` for the state of `from`; none where one of them is not loaded.
-    pub fn convert(self, from: ProgramHash, to: ProgramHash, state: &[u64]) -> Option<Vec<u64>> {
+    /// The first state of `to`, at a sample with these inputs, for the state of `from`; none where one of them is not loaded.
+    pub fn convert(
+        self,
+        (from, to): (ProgramHash, ProgramHash),
+        state: &[u64],
+        inputs: &[u64],
+    ) -> Option<Vec<u64>> {
         let change = self.change?;
-        match (change.before.hash, change.after.hash) {
-            hashes if hashes == (from, to) => Some(change.forward.convert(state)),
-            hashes if hashes == (to, from) => Some(change.back.convert(state)),
-            _ => None,
-        }
+        let conversion = match (change.before.hash, change.after.hash) {
+            hashes if hashes == (from, to) => &change.forward,
+            hashes if hashes == (to, from) => &change.back,
+            _ => return None,
+        };
+        let mut state = conversion.convert(state);
+        conversion.release(&mut state, inputs);
+        Some(state)
     }
 }
 
