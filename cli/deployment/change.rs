@@ -137,7 +137,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         }
         Step::Accept => {
             // Where the change is over already, as on a second run of this step, all members say so.
-            let request = ChangeRequest::Forget { configuration: texts.after };
+            let request =
+                ChangeRequest::Forget { change: texts.name(), configuration: texts.after };
             let [first, others] = members.deciding(&texts);
             let mut ended = members.ask_all(first, &request);
             if ended.is_done() {
@@ -185,7 +186,11 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
         let begun = Instant::now();
         loop {
             for member in pair.into_iter().filter(|member| members.all().contains(member)) {
-                members.ask(member, &ChangeRequest::Switch { to }, &mut of_pair);
+                members.ask(
+                    member,
+                    &ChangeRequest::Switch { change: texts.name(), to },
+                    &mut of_pair,
+                );
             }
             of_pair.keep_done();
             if of_pair.of_code("U0636").is_empty() || begun.elapsed() >= LOADING_PATIENCE {
@@ -222,13 +227,13 @@ impl Finish {
         let [first, others] = members.deciding(texts);
         asked.0.clear();
         // No member leaves the old program behind before the trials of the new ones are over.
-        let run = ChangeRequest::Run { configuration };
+        let run = ChangeRequest::Run { change: texts.name(), configuration };
         members.ask_until(first, &run, PATIENCE + trial, &mut asked);
         if asked.is_done() {
             asked.0.append(&mut members.ask_all(others, &run).0);
         }
         if asked.is_done() {
-            let forget = ChangeRequest::Forget { configuration };
+            let forget = ChangeRequest::Forget { change: texts.name(), configuration };
             members.ask_until(members.all(), &forget, PATIENCE, &mut asked);
         }
         asked

@@ -7,7 +7,7 @@ use std::time::Instant;
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use understudy_journal::{Command, Commander, OperatorAction};
-use understudy_wire::{Member, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use super::deaths::{Records, is};
 use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time};
@@ -89,9 +89,9 @@ fn a_program_changes_while_stations_are_killed() {
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     let commander = Commander::of_run(run.clone());
     let mut records = Records::of(&run);
-    let act = |station: u8, command: Command| {
+    let act = |member: Member, command: Command| {
         let action = OperatorAction::Command {
-            member: Member::Station(StationId(station)),
+            member,
             command,
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
@@ -116,9 +116,9 @@ fn a_program_changes_while_stations_are_killed() {
     done("switch");
     records.wait_for("the change", |record| is(record, "counter-io", "program-changed"));
     for (station, name) in [(0, "counter"), (2, "understudy")] {
-        act(station, Command::Kill);
+        act(Member::Station(StationId(station)), Command::Kill);
         records.wait_for("its end", |record| is(record, "counter-io", "unprotected"));
-        act(station, Command::Restart);
+        act(Member::Station(StationId(station)), Command::Restart);
         records.wait_for("its state", |record| is(record, name, "synchronised"));
         records.wait_for("protection", |record| is(record, "counter-io", "protected"));
     }
@@ -138,7 +138,12 @@ fn a_program_changes_while_stations_are_killed() {
     done("accept");
     done("accept");
     records.wait_for("the new change", |record| is(record, "counter-io", "program-changed"));
-    // What was accepted is over: nothing loads it again, and nothing takes the program back.
+    // What was accepted is over: nothing loads it again, and nothing takes the program back. So it is for a remote I/O that starts again.
+    let remote_io = Member::RemoteIo(ProgramId(0));
+    for command in [Command::Kill, Command::Restart] {
+        act(remote_io, command);
+    }
+    records.wait_for("its start", |record| is(record, "counter-io", "adopted-lineage"));
     for again in [&["prepare"][..], &["cancel", "--drop"], &["prepare"]] {
         let given = [&["change", run_text, &after], again].concat();
         let (exit, document, _) = answer(&given);

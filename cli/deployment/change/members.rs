@@ -146,7 +146,8 @@ impl<'a> Members<'a> {
                 continue;
             }
             let mut ended = Asked::default();
-            self.ask(*member, &ChangeRequest::Forget { configuration }, &mut ended);
+            let forget = ChangeRequest::Forget { change: texts.name(), configuration };
+            self.ask(*member, &forget, &mut ended);
             let ended = ended.0.pop().map(|(.., said)| said);
             match ended {
                 Some(Ok(())) => *said = Ok(()),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
 use understudy_typed::{CarriedPath, Fate, Fault, Program as TypedProgram, Successor};
-use understudy_wire::{ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
+use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
 use crate::cluster::Cluster;
 use crate::code::{Code, Unnamed};
@@ -172,6 +172,11 @@ impl ChangeTexts {
         } else {
             Err(reasons)
         }
+    }
+
+    /// The two configurations.
+    pub fn name(&self) -> ChangeName {
+        ChangeName { before: self.before, after: self.after }
     }
 
     /// The change back.

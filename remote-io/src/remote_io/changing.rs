@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use understudy_cycle::{ChangeOrder, OnlineChange, Output};
 use understudy_wire::{
-    ConfigurationHash, Configurations, Header, OrderRefusal, ProgramHash, StationId, StationSet,
-    Time,
+    ChangeName, ConfigurationHash, Configurations, Header, OrderRefusal, ProgramHash, StationId,
+    StationSet, Time,
 };
 
 use super::{Execution, RemoteIo};
@@ -123,8 +123,8 @@ impl RemoteIo {
 
     /// Moves an online change on.
     pub(super) fn take_change(&mut self, now: Time, order: &ChangeOrder) {
-        if let ChangeOrder::Switch(to) = order {
-            let outcome = self.may_switch(*to);
+        if let ChangeOrder::Switch(change, to) = order {
+            let outcome = self.may_switch(*change, *to);
             if outcome.is_ok() && self.replacing.wanted != Some(*to) {
                 self.replacing.wanted = Some(*to);
                 self.replacing.trial = Trial::None;
@@ -153,10 +153,12 @@ impl RemoteIo {
 
     /// A program that is on trial is not accepted yet, and one that was taken back is not accepted at all.
     fn refusal_of_trial(&self, order: &ChangeOrder) -> Option<OrderRefusal> {
-        let (ChangeOrder::Run(configuration) | ChangeOrder::Forget(configuration)) = order else {
+        let (ChangeOrder::Run(name, configuration) | ChangeOrder::Forget(name, configuration)) =
+            order
+        else {
             return None;
         };
-        let change = self.member.changing().change()?;
+        let change = self.member.changing().change().filter(|change| change.name() == *name)?;
         let accepted = change.program_in(*configuration, self.settings.program)?.hash;
         let Replacing { wanted, trial, .. } = self.replacing;
         // The trial begins with the change mark.
@@ -223,8 +225,8 @@ impl RemoteIo {
     }
 
     /// Whether the history may change to a program: no station that computes it now would be silent from then on.
-    fn may_switch(&self, to: ProgramHash) -> Result<(), OrderRefusal> {
-        let is_changed = self.member.changing().change().is_some() && self.is_loaded(to);
+    fn may_switch(&self, name: ChangeName, to: ProgramHash) -> Result<(), OrderRefusal> {
+        let is_changed = self.member.changing().has_loaded(name) && self.is_loaded(to);
         if !is_changed {
             return Err(OrderRefusal::NotPrepared);
         }
