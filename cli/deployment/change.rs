@@ -260,7 +260,7 @@ fn needs_stop(reasons: &[NeedsStop]) -> Answer {
     let mut answer = Answer::failed(
         Status::BadInput,
         "U0630",
-        "the change needs a stop: an online change replaces programs and nothing else".to_owned(),
+        "the change needs a stop, since an online change replaces programs only: make these settings equal in both files, or stop the cluster and start all members with the new file".to_owned(),
     );
     for reason in reasons {
         answer = answer.and_failure(Status::BadInput, "U0630", reason.to_string());
