@@ -16,10 +16,10 @@ use understudy_cluster::{
 use understudy_text::duration::parse_positive;
 use understudy_typed::{CarriedPath, Fate};
 use understudy_view::Run;
-use understudy_wire::{ChangeRequest, ConfigurationHash, Member};
+use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal};
 
 use self::difference::{Differences, newest_states};
-use self::members::Members;
+use self::members::{Members, gives};
 use crate::answer::{Answer, Status};
 use crate::files;
 
@@ -137,12 +137,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         }
         Step::Accept => {
             // Where the change is over already, as on a second run of this step, all members say so.
-            let ended = members.ask_all(&ChangeRequest::Forget { configuration: texts.after });
+            let request =
+                ChangeRequest::Forget { change: texts.name(), configuration: texts.after };
+            let [first, others] = members.deciding(&texts);
+            let mut ended = members.ask_all(first, &request);
             if ended.is_done() {
+                ended.0.append(&mut members.ask_all(others, &request).0);
+            }
+            let is_taken_back = |why: &String| gives(why, OrderRefusal::TakenBack);
+            let is_taken_back =
+                ended.0.iter().any(|(.., said)| said.as_ref().is_err_and(is_taken_back));
+            if ended.is_done() || is_taken_back {
                 return Ok(ended.answer("runs the new configuration", plan.json()));
             }
             let asked = switch(&members, &texts, true);
-            finish(&members, asked, texts.after, "runs the new configuration", plan.json())
+            let finish = Finish {
+                configuration: texts.after,
+                trial: longest_trial(&before, &texts),
+                done: "runs the new configuration",
+            };
+            Ok(finish.ask(&members, &texts, asked).answer(finish.done, plan.json()))
         }
         Step::Cancel => {
             let back = Plan::back(&before, &after, &texts);
@@ -151,7 +165,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
                 "the old program does not have all values that the new one can have, so these begin with their initial values",
             )?;
             let asked = switch(&members, &texts, false);
-            finish(&members, asked, texts.before, "runs the old configuration", plan.json())
+            let finish = Finish {
+                configuration: texts.before,
+                trial: Duration::ZERO,
+                done: "runs the old configuration",
+            };
+            Ok(finish.ask(&members, &texts, asked).answer(finish.done, plan.json()))
         }
     }
 }
@@ -167,7 +186,11 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
         let begun = Instant::now();
         loop {
             for member in pair.into_iter().filter(|member| members.all().contains(member)) {
-                members.ask(member, &ChangeRequest::Switch { to }, &mut of_pair);
+                members.ask(
+                    member,
+                    &ChangeRequest::Switch { change: texts.name(), to },
+                    &mut of_pair,
+                );
             }
             of_pair.keep_done();
             if of_pair.of_code("U0636").is_empty() || begun.elapsed() >= LOADING_PATIENCE {
@@ -184,37 +207,47 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
     asked
 }
 
-/// Makes a configuration that of all members, and ends the change; `switched` is what the remote I/Os said to its programs.
-fn finish(
-    members: &Members<'_>,
-    switched: Asked,
+/// How a change ends.
+struct Finish {
+    /// The configuration of all members from then on.
     configuration: ConfigurationHash,
-    done: &str,
-    plan: Value,
-) -> Result<Answer, Answer> {
-    if !switched.is_done() {
-        return Ok(switched.answer(done, plan));
-    }
-    let mut asked = members.ask_all(&ChangeRequest::Run { configuration });
-    if !asked.is_done() {
-        return Ok(asked.answer(done, plan));
-    }
-    let begun = Instant::now();
-    let mut left = members.all();
-    loop {
-        let mut ended = Asked::default();
-        for member in std::mem::take(&mut left) {
-            members.ask(member, &ChangeRequest::Forget { configuration }, &mut ended);
+    /// Time for which a program may still be on trial.
+    trial: Duration,
+    /// What a member that has done it does.
+    done: &'static str,
+}
+
+impl Finish {
+    /// Makes the configuration that of all members, and ends the change; `asked` is what the remote I/Os of its programs said to the switch.
+    fn ask(&self, members: &Members<'_>, texts: &ChangeTexts, mut asked: Asked) -> Asked {
+        let Self { configuration, trial, .. } = *self;
+        if !asked.is_done() {
+            return asked;
         }
-        let waits = ended.of_code("U0634");
-        asked.take(ended, &waits);
-        if waits.is_empty() || begun.elapsed() >= PATIENCE {
-            asked.waits_for(members, &waits);
-            return Ok(asked.answer(done, plan));
+        let [first, others] = members.deciding(texts);
+        asked.0.clear();
+        // No member leaves the old program behind before the trials of the new ones are over.
+        let run = ChangeRequest::Run { change: texts.name(), configuration };
+        members.ask_until(first, &run, PATIENCE + trial, &mut asked);
+        if asked.is_done() {
+            asked.0.append(&mut members.ask_all(others, &run).0);
         }
-        left = waits;
-        pause();
+        if asked.is_done() {
+            let forget = ChangeRequest::Forget { change: texts.name(), configuration };
+            members.ask_until(members.all(), &forget, PATIENCE, &mut asked);
+        }
+        asked
     }
+}
+
+/// The longest trial of the programs of a change.
+fn longest_trial(before: &Cluster, texts: &ChangeTexts) -> Duration {
+    let remote_ios = texts
+        .programs
+        .iter()
+        .filter_map(|changed| before.remote_ios().get(changed.program.index()));
+    let cycles = remote_ios.map(|remote_io| remote_io.trial_cycles).max().unwrap_or(0);
+    before.agreement().schedule.period() * cycles
 }
 
 /// Before members or a run are asked again.
@@ -227,7 +260,7 @@ fn needs_stop(reasons: &[NeedsStop]) -> Answer {
     let mut answer = Answer::failed(
         Status::BadInput,
         "U0630",
-        "the change needs a stop: an online change replaces programs and nothing else".to_owned(),
+        "the change needs a stop, since an online change replaces programs only: make these settings equal in both files, or stop the cluster and start all members with the new file".to_owned(),
     );
     for reason in reasons {
         answer = answer.and_failure(Status::BadInput, "U0630", reason.to_string());
@@ -263,7 +296,7 @@ impl Asked {
     /// Takes what was refused later, but for members that are asked again.
     fn take(&mut self, later: Self, waits: &[Member]) {
         for (member, name, said) in later.0 {
-            if said.is_err() && !waits.contains(&member) {
+            if !waits.contains(&member) {
                 self.0.retain(|(known, ..)| *known != member);
                 self.0.push((member, name, said));
             }

@@ -385,7 +385,7 @@ impl Replica {
         let program = versions.of(target).ok_or(target)?;
         let converted = match target == held.state.program {
             true => None,
-            false => Some(converted(versions, &held.state, program).ok_or(target)?),
+            false => Some(converted(versions, (&held.state, program), &step.inputs).ok_or(target)?),
         };
         let oldest = match self.past.len() < self.history {
             true => None,
@@ -421,9 +421,14 @@ impl Replica {
     }
 }
 
-/// The first state of `program` for a state of another program.
-fn converted(versions: Versions<'_>, state: &State, program: &Program) -> Option<Image> {
-    let words = versions.convert(state.program, program.hash, state.bits.words())?;
+/// The first state of `program` for a state of another program, at a sample with these inputs.
+fn converted(
+    versions: Versions<'_>,
+    (state, program): (&State, &Program),
+    inputs: &Image,
+) -> Option<Image> {
+    let between = (state.program, program.hash);
+    let words = versions.convert(between, state.bits.words(), inputs.words())?;
     Image::from_words(program.executable.state_count(), &words).ok()
 }
 

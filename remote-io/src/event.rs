@@ -41,6 +41,16 @@ pub enum Event {
         /// Hash of the program after.
         to: ProgramHash,
     },
+    /// A program fault has stopped the new program of an online change while it was on trial: the program before takes the next sample and all after it,
+    /// with the values of before the scan of the fault.
+    ChangeTakenBack {
+        /// Cycle of the deadline that shows the fault.
+        moment: Moment,
+        /// Hash of the program that was stopped.
+        from: ProgramHash,
+        /// Hash of the program before.
+        to: ProgramHash,
+    },
     /// The configuration that it runs, and the one that it has loaded beside it, after a step of an online change.
     Configured(Configurations),
     /// A deadline: the sample of this cycle, and the outputs that are driven from now on.

@@ -43,7 +43,7 @@ use std::time::Duration;
 use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
 use understudy_wire::{
     Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
-    ProgramHash, ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
+    ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -54,6 +54,7 @@ use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::trust::Trust;
 
+use changing::Replacing;
 use forcing::Forcing;
 use knowledge::Knowledge;
 use pairing::Pairing;
@@ -104,10 +105,7 @@ pub struct RemoteIo {
     trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
     differed: Vec<(Option<ProgramId>, StationSet)>,
-    /// The program that an online change wants; a change mark that becomes void is made again.
-    wanted: Option<ProgramHash>,
-    /// Stations that have loaded the online change, as their newest frames say.
-    prepared: StationSet,
+    replacing: Replacing,
 }
 
 /// Who authorises the outputs that are proven.
@@ -223,8 +221,7 @@ impl RemoteIo {
             program: Execution::Running,
             trust: Trust::default(),
             differed: Vec::new(),
-            wanted: None,
-            prepared: StationSet::EMPTY,
+            replacing: Replacing::default(),
             settings,
         };
         remote_io.member.wake_at(remote_io.next_wakeup());

@@ -41,6 +41,8 @@ pub struct Settings {
     pub diagnosis: Option<Arc<Diagnosis>>,
     /// Cycles for which the last proven outputs are held.
     pub hold_cycles: u32,
+    /// Cycles after the switch of an online change in which a program fault takes the change back; never where it is 0.
+    pub trial_cycles: u32,
     /// Fail-safe y(i), applied after that; its width is that of the outputs.
     pub fail_safe: Image,
     /// Outputs that move to their fail-safe values by a ramp.

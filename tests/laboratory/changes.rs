@@ -2,14 +2,15 @@
 
 use std::fs;
 use std::path::Path;
+use std::time::Instant;
 
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use understudy_journal::{Command, Commander, OperatorAction};
-use understudy_wire::{Member, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use super::deaths::{Records, is};
-use super::shared::{answer, empty_folder, some_at_a_time};
+use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time};
 use super::{no_orphan, running_with, signal};
 
 const CLUSTER: &str = r#"
@@ -88,9 +89,9 @@ fn a_program_changes_while_stations_are_killed() {
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     let commander = Commander::of_run(run.clone());
     let mut records = Records::of(&run);
-    let act = |station: u8, command: Command| {
+    let act = |member: Member, command: Command| {
         let action = OperatorAction::Command {
-            member: Member::Station(StationId(station)),
+            member,
             command,
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
@@ -115,9 +116,9 @@ fn a_program_changes_while_stations_are_killed() {
     done("switch");
     records.wait_for("the change", |record| is(record, "counter-io", "program-changed"));
     for (station, name) in [(0, "counter"), (2, "understudy")] {
-        act(station, Command::Kill);
+        act(Member::Station(StationId(station)), Command::Kill);
         records.wait_for("its end", |record| is(record, "counter-io", "unprotected"));
-        act(station, Command::Restart);
+        act(Member::Station(StationId(station)), Command::Restart);
         records.wait_for("its state", |record| is(record, name, "synchronised"));
         records.wait_for("protection", |record| is(record, "counter-io", "protected"));
     }
@@ -137,7 +138,12 @@ fn a_program_changes_while_stations_are_killed() {
     done("accept");
     done("accept");
     records.wait_for("the new change", |record| is(record, "counter-io", "program-changed"));
-    // What was accepted is over: nothing loads it again, and nothing takes the program back.
+    // What was accepted is over: nothing loads it again, and nothing takes the program back. So it is for a remote I/O that starts again.
+    let remote_io = Member::RemoteIo(ProgramId(0));
+    for command in [Command::Kill, Command::Restart] {
+        act(remote_io, command);
+    }
+    records.wait_for("its start", |record| is(record, "counter-io", "adopted-lineage"));
     for again in [&["prepare"][..], &["cancel", "--drop"], &["prepare"]] {
         let given = [&["change", run_text, &after], again].concat();
         let (exit, document, _) = answer(&given);
@@ -157,6 +163,71 @@ fn a_program_changes_while_stations_are_killed() {
     steps.dedup();
     // Outputs that are held in a stall of this machine leave a pair out, and no other step in.
     assert_eq!(steps, [1, 10, 1, 10], "{steps:?}");
+    let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(summary["violation_count"], 0, "{summary:#}");
+}
+
+/// A new program that a fault stops in its eighth scan: it is taken back, the plant misses the cycle of the fault, and the change can be cancelled only.
+#[test]
+fn a_program_fault_takes_a_change_back() {
+    let _one = some_at_a_time();
+    let out = empty_folder("changes-fault");
+    let before = write_cluster(&out.join("before"), &counter("INT", 1));
+    let broken = counter("INT", 10)
+        .replace("count : INT;", "count : INT; scans : INT; divided : INT;")
+        .replace("shown :=", "scans := scans + 1;\n  divided := 1 / (8 - scans);\n  shown :=");
+    let after = write_cluster(&out.join("after"), &broken);
+    let runs = out.join("runs");
+    let more = ["--cycles", "100000", "--allow-commands"];
+    let (mut child, _errors) =
+        running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    let mut records = Records::of(&run);
+    let run_text = run.to_str().expect("text");
+    let step = |step: &str| answer(&["change", run_text, &after, step]);
+    let done = |word: &str| {
+        let (exit, document, errors) = step(word);
+        assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+    };
+    let wait_for_alarm = |lasts: bool| {
+        let deadline = Instant::now() + DEADLINE;
+        loop {
+            let (_, document, _) = answer(&["top", run_text]);
+            let alarms = document["result"]["alarms"].as_array().expect("alarms");
+            let alarm = alarms.iter().find(|alarm| alarm["alarm"] == "change-taken-back");
+            if alarm.is_some_and(|alarm| alarm["over"].is_null() == lasts) {
+                return;
+            }
+            assert!(Instant::now() < deadline, "{document:#}");
+        }
+    };
+    done("prepare");
+    // It waits until the trial is over.
+    let (exit, document, _) = step("accept");
+    let failure = &document["failures"][0];
+    assert_eq!((exit, &failure["code"]), (1, &Value::from("U0632")), "{document:#}");
+    let why = failure["message"].as_str().unwrap_or_default();
+    assert!(why.contains("a program fault has taken the change back"), "{document:#}");
+    records.wait_for("the end", |record| is(record, "counter-io", "change-taken-back"));
+    records.wait_for("the change back", |record| is(record, "counter-io", "program-changed"));
+    wait_for_alarm(true);
+    let (exit, document, _) = step("accept");
+    assert_eq!((exit, &document["failures"][0]["code"]), (1, &Value::from("U0632")));
+    done("cancel");
+    wait_for_alarm(false);
+    signal(child.id(), Signal::SIGINT);
+    child.wait().expect("it ends");
+    no_orphan(&runs);
+    let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
+    let counts = counts(&journal);
+    let pairs = counts.windows(2).filter(|pair| pair[1].0 == pair[0].0 + 1);
+    let mut steps: Vec<u64> = pairs.map(|pair| pair[1].1 - pair[0].1).collect();
+    steps.dedup();
+    assert_eq!(steps, [1, 10, 1], "{steps:?}");
+    let around = counts.windows(2).find(|pair| pair[1].0 == pair[0].0 + 2);
+    let around = around.expect("the fault costs a cycle");
+    assert_eq!(around[1].1 - around[0].1, 1, "{around:?}");
     let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["violation_count"], 0, "{summary:#}");

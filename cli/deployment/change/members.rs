@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::time::SystemTime;
+use std::time::{Duration, Instant, SystemTime};
 
 use understudy_bus::{Call, DONE, Peer, Request, TlsKeys};
 use understudy_cluster::{Addresses, ChangeTexts, Cluster};
@@ -12,7 +12,7 @@ use understudy_member::tls_keys;
 use understudy_view::{Run, find_running_of};
 use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal};
 
-use super::{Arguments, Asked};
+use super::{Arguments, Asked, pause};
 use crate::answer::{Answer, Status};
 
 /// The members of a running cluster.
@@ -71,11 +71,7 @@ impl<'a> Members<'a> {
         };
         let mut asked = Asked::default();
         // Where the change is over, its remote I/Os say so, and no member loads it.
-        let decides = |member: &Member| {
-            let of = |program| [Member::RemoteIo(program), Member::Twin(program)].contains(member);
-            texts.programs.iter().any(|changed| of(changed.program))
-        };
-        let (first, others): (Vec<Member>, _) = self.all().into_iter().partition(decides);
+        let [first, others] = self.deciding(texts);
         for member in first.into_iter().chain(others) {
             let is_over = |why: &String| gives(why, OrderRefusal::IsOver);
             if asked.0.iter().any(|(.., said)| said.as_ref().is_err_and(is_over)) {
@@ -96,13 +92,44 @@ impl<'a> Members<'a> {
         Ok(asked)
     }
 
-    /// Asks all members that are not left out.
-    pub(super) fn ask_all(&self, request: &ChangeRequest) -> Asked {
+    /// The remote I/Os of the programs that change, and all other members.
+    pub(super) fn deciding(&self, texts: &ChangeTexts) -> [Vec<Member>; 2] {
+        let decides = |member: &Member| {
+            let of = |program| [Member::RemoteIo(program), Member::Twin(program)].contains(member);
+            texts.programs.iter().any(|changed| of(changed.program))
+        };
+        let (first, others) = self.all().into_iter().partition(decides);
+        [first, others]
+    }
+
+    /// Asks these members.
+    pub(super) fn ask_all(&self, members: Vec<Member>, request: &ChangeRequest) -> Asked {
         let mut asked = Asked::default();
-        for member in self.all() {
+        for member in members {
             self.ask(member, request, &mut asked);
         }
         asked
+    }
+
+    /// Asks these members, and again those that still need the other configuration, until `patience` is over; `asked` then has the newest answers.
+    pub(super) fn ask_until(
+        &self,
+        mut left: Vec<Member>,
+        request: &ChangeRequest,
+        patience: Duration,
+        asked: &mut Asked,
+    ) {
+        let begun = Instant::now();
+        loop {
+            let ended = self.ask_all(std::mem::take(&mut left), request);
+            let waits = ended.of_code("U0634");
+            asked.take(ended, &waits);
+            if waits.is_empty() || begun.elapsed() >= patience {
+                return asked.waits_for(self, &waits);
+            }
+            left = waits;
+            pause();
+        }
     }
 
     /// Of what was refused because no change is loaded: a member that has this configuration alone is done, and one that has accepted the change says
@@ -119,7 +146,8 @@ impl<'a> Members<'a> {
                 continue;
             }
             let mut ended = Asked::default();
-            self.ask(*member, &ChangeRequest::Forget { configuration }, &mut ended);
+            let forget = ChangeRequest::Forget { change: texts.name(), configuration };
+            self.ask(*member, &forget, &mut ended);
             let ended = ended.0.pop().map(|(.., said)| said);
             match ended {
                 Some(Ok(())) => *said = Ok(()),

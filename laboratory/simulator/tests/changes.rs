@@ -26,6 +26,7 @@ ladder = "lamp.st"
 
 [[remote_io]]
 controller = "counter"
+trial_cycles = 10
 
 [[remote_io]]
 controller = "lamp"
@@ -77,8 +78,20 @@ fn cluster(counter: &str) -> Cluster {
     loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
 }
 
+/// As the new program, and stopped by a fault in its scan of this number, counted from 1.
+fn faulty(scan: u32) -> String {
+    let body =
+        format!("scans := scans + 1;\n  divided := 1 / ({scan} - scans);\n  count := count + 10;");
+    let text = AFTER.replace("count := count + 10;", &body);
+    text.replace("count : DINT;", "count : DINT; scans : INT; divided : INT;")
+}
+
 fn changing() -> Parts {
-    let (before, after) = (cluster(BEFORE), cluster(AFTER));
+    changing_between(BEFORE, AFTER)
+}
+
+fn changing_between(before: &str, after: &str) -> Parts {
+    let (before, after) = (cluster(before), cluster(after));
     let texts = ChangeTexts::between(&before, &after).expect("only a program differs");
     let change = texts.load(&before).expect("it is of this cluster");
     Parts { change: Some(Arc::new(change)), ..parts(&before) }
@@ -123,6 +136,7 @@ struct Seen {
     not_prepared: u32,
     configured: u32,
     cold_starts: u32,
+    taken_back: u32,
 }
 
 impl Seen {
@@ -134,6 +148,7 @@ impl Seen {
                 self.counts.push((*source, count_in(outputs)));
             }
             Record::RemoteIo(Event::ProgramChanged { .. }) => self.changes += 1,
+            Record::RemoteIo(Event::ChangeTakenBack { .. }) => self.taken_back += 1,
             Record::RemoteIo(Event::StartedCold { .. }) => self.cold_starts += 1,
             Record::Station(understudy_node::Event::NotPrepared { .. }) => self.not_prepared += 1,
             Record::Station(understudy_node::Event::Configured(_))
@@ -149,7 +164,11 @@ fn count_in(outputs: &Image) -> i32 {
 }
 
 fn run(faults: &[Fault], cycles: u64) -> (Simulation, Seen) {
-    let mut simulation = Simulation::new(changing(), Network::default(), 7);
+    run_with(changing(), faults, cycles)
+}
+
+fn run_with(parts: Parts, faults: &[Fault], cycles: u64) -> (Simulation, Seen) {
+    let mut simulation = Simulation::new(parts, Network::default(), 7);
     for fault in faults {
         simulation.schedule(*fault);
     }
@@ -236,6 +255,68 @@ fn a_straggler_is_silent_until_it_is_prepared() {
     assert!(simulation.tallies()[0].reconstructed > 20);
 }
 
+/// Steps of the count in all cycles; repeated ones are one.
+fn steps(seen: &Seen) -> Vec<i32> {
+    let mut steps: Vec<i32> = seen.counts.windows(2).map(|pair| pair[1].1 - pair[0].1).collect();
+    steps.dedup();
+    steps
+}
+
+/// In each scan of the trial, while no station fails and while one is lost just then: the program of before goes on with the values of before the fault
+/// and costs the one cycle in which the fault occurs, held.
+#[test]
+fn a_program_fault_on_trial_takes_the_change_back() {
+    for scan in 1..=10 {
+        for lost in [None, Some(0), Some(2)] {
+            let mut faults = whole_change(20);
+            faults.retain(|fault| fault.at_cycle < 60);
+            if let Some(station) = lost {
+                let cycle = 39 + u64::from(scan);
+                faults.push(at(cycle, 0.5, Member::Station(StationId(station)), Action::Crash));
+            }
+            let is_given_once = |fault: &Fault| {
+                let is_switch = matches!(fault.action, Action::Change { step: ChangeStep::Switch });
+                !is_switch || fault.at_cycle <= 41
+            };
+            faults.retain(is_given_once);
+            let parts = changing_between(BEFORE, &faulty(scan));
+            let (simulation, seen) = run_with(parts, &faults, 100);
+            assert!(simulation.violations().is_empty(), "{scan} {:?}", simulation.violations());
+            assert_eq!((seen.changes, seen.taken_back), (2, 1), "{scan} {lost:?}");
+            assert_eq!(misses(simulation.tallies()), 1, "{scan} {lost:?}");
+            let expected = if scan == 1 { &[1, 0, 1][..] } else { &[1, 10, 0, 1] };
+            assert_eq!(steps(&seen), expected, "{scan} {lost:?}");
+        }
+    }
+}
+
+/// After the trial, and of a program that a fault had stopped before the switch: the program stays stopped until the operator releases it.
+#[test]
+fn no_other_program_fault_takes_a_change_back() {
+    let mut faults = whole_change(20);
+    faults.retain(|fault| fault.at_cycle < 60);
+    let broken = BEFORE.replace("count := count + 1;", "count := count + 1 + 0 / (15 - count);");
+    let changes = [changing_between(BEFORE, &faulty(11)), changing_between(&broken, AFTER)];
+    for parts in changes {
+        let (simulation, seen) = run_with(parts, &faults, 120);
+        assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+        assert_eq!((seen.changes, seen.taken_back), (1, 0));
+        let last = seen.counts.last().expect("applied");
+        assert_eq!(last.0, Source::FailSafe);
+    }
+}
+
+/// The tool of this test gives `switch` again and again.
+#[test]
+fn a_change_that_is_given_again_is_taken_back_again() {
+    let parts = changing_between(BEFORE, &faulty(5));
+    let (simulation, seen) = run_with(parts, &whole_change(20), 150);
+    assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+    assert!(seen.taken_back > 1);
+    assert_eq!(seen.changes, 2 * seen.taken_back);
+    assert_eq!(seen.counts.last().expect("applied").0, Source::Direct);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -289,6 +370,7 @@ proptest! {
             (0..MEMBERS.len(), 0..MEMBERS.len(), 0..9_usize, 0_u64..120, 1_u64..40, 0.0..1.0), 0..6,
         ),
         seed: u64,
+        faulty_scan in prop::option::of(1_u32..20),
     ) {
         let mut schedule = Vec::new();
         for (cycle, place, kind) in steps {
@@ -332,7 +414,8 @@ proptest! {
                 _ => {}
             }
         }
-        let mut simulation = Simulation::new(changing(), Network::default(), seed);
+        let parts = faulty_scan.map_or_else(changing, |scan| changing_between(BEFORE, &faulty(scan)));
+        let mut simulation = Simulation::new(parts, Network::default(), seed);
         for fault in &schedule {
             simulation.schedule(*fault);
         }

@@ -189,6 +189,7 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::Released { .. } => of("released"),
         RemoteIo::Configured(_) => of("configured"),
         RemoteIo::ProgramChanged { .. } => of("program-changed"),
+        RemoteIo::ChangeTakenBack { .. } => of("change-taken-back"),
         RemoteIo::Forced { force, .. } => about("forced", &force.signal),
         RemoteIo::Unforced { signal, .. } => return Some(Effect::Ends(about("forced", signal))),
         RemoteIo::SignalValidity { input, .. } => about("validity", input),

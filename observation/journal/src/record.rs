@@ -235,6 +235,7 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Disputed { moment, .. }
             | RemoteIo::ConfigurationDisputed { moment, .. }
             | RemoteIo::ProgramChanged { moment, .. }
+            | RemoteIo::ChangeTakenBack { moment, .. }
             | RemoteIo::PartChanged { moment, .. }
             | RemoteIo::PartnerLost { moment }
             | RemoteIo::PartnerReceived { moment }

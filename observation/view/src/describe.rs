@@ -114,6 +114,9 @@ pub(crate) const ALARM_OVER: &str = "alarm-over";
 /// The event of a program fault.
 pub(crate) const PROGRAM_FAULT: &str = "program-fault";
 
+/// The event of an online change that a program fault has taken back.
+pub(crate) const CHANGE_TAKEN_BACK: &str = "change-taken-back";
+
 /// An alarm on a signal that was raised or is over, as an event with its level and its text.
 pub(crate) fn alarm_event(declared: &AlarmDeclaration, transition: AlarmTransition) -> Words {
     let (event, level, what) = match transition {

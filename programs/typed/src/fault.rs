@@ -153,6 +153,14 @@ impl Fault {
         (state[1], state[2]) = (first, second);
     }
 
+    /// Takes the fault of a state away: the program goes on with the values of before the scan of the fault.
+    ///
+    /// # Panics
+    /// If the state is shorter than [`Program::HEADER`].
+    pub fn clear(state: &mut [u64]) {
+        state[..3].fill(0);
+    }
+
     /// What an operator reads: where, what, the values.
     pub fn describe(&self, program: &Program) -> String {
         let routine = self.routine.and_then(|routine| program.routines.get(routine.0 as usize));

@@ -1,12 +1,16 @@
 //! An online change between two cluster files: what it replaces, and why it needs a stop where it does.
 
+mod settings;
+
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
-use understudy_typed::{CarriedPath, Fate, Successor};
-use understudy_wire::{ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
+use understudy_typed::{CarriedPath, Fate, Fault, Program as TypedProgram, Successor};
+use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
+pub use self::settings::ChangedSetting;
+use self::settings::changed_settings;
 use crate::cluster::Cluster;
 use crate::code::{Code, Unnamed};
 use crate::configuration::with_programs;
@@ -126,13 +130,8 @@ pub enum NeedsStop {
     #[error(transparent)]
     Unfit(#[from] Unfit),
     /// Something else than a program differs.
-    #[error("the two files differ in `{before}` and `{after}`")]
-    Settings {
-        /// The first line of the canonical text of the configuration before that differs; empty where it has ended.
-        before: String,
-        /// The same of the configuration after.
-        after: String,
-    },
+    #[error("{0}")]
+    Setting(ChangedSetting),
 }
 
 impl ChangeTexts {
@@ -146,10 +145,10 @@ impl ChangeTexts {
             return Err(vec![NeedsStop::OtherCluster { before, after }]);
         }
         let mut reasons = Vec::new();
-        if let Some((before, after)) = first_difference(&before.frame_text, &after.frame_text) {
-            reasons.push(NeedsStop::Settings { before, after });
-        }
+        let changed = changed_settings(&before.frame_text, &after.frame_text);
+        reasons.extend(changed.into_iter().map(NeedsStop::Setting));
         let pairs = before.controllers().iter().zip(after.controllers());
+        let pairs = pairs.filter(|(old, new)| old.name == new.name);
         let mut programs = Vec::new();
         for (place, (old, new)) in (0..).zip(pairs) {
             reasons.extend(Unfit::points(&old.name, &old.code, &new.code).map(NeedsStop::from));
@@ -172,6 +171,11 @@ impl ChangeTexts {
         } else {
             Err(reasons)
         }
+    }
+
+    /// The two configurations.
+    pub fn name(&self) -> ChangeName {
+        ChangeName { before: self.before, after: self.after }
     }
 
     /// The change back.
@@ -351,6 +355,15 @@ impl Conversion for Between {
     fn convert(&self, state: &[u64]) -> Vec<u64> {
         self.to.changed(&self.from, state, &self.successor)
     }
+
+    fn release(&self, state: &mut [u64], inputs: &[u64]) {
+        // Only programs on the register machine have a reset, and their state is that of the typed program.
+        let reset = self.to.typed().inputs.find(TypedProgram::RESET);
+        let reset = reset.filter(|point| point.slot == 0);
+        if reset.is_some_and(|reset| reset.get(inputs) != 0) {
+            Fault::clear(state);
+        }
+    }
 }
 
 /// What becomes of each variable of a program in an online change.
@@ -431,20 +444,6 @@ fn different_point(before: &Code, after: &Code) -> Option<String> {
         }
     }
     None
-}
-
-fn first_difference(before: &str, after: &str) -> Option<(String, String)> {
-    let (mut old, mut new) = (before.lines(), after.lines());
-    loop {
-        match (old.next(), new.next()) {
-            (None, None) => return None,
-            (one, other) if one != other => {
-                let line = |line: Option<&str>| line.unwrap_or_default().trim().to_owned();
-                return Some((line(one), line(other)));
-            }
-            _ => {}
-        }
-    }
 }
 
 #[cfg(test)]

@@ -146,6 +146,8 @@ pub struct RemoteIo {
     pub name: String,
     /// Cycles for which the last true outputs are kept when nothing true is there.
     pub hold_cycles: u32,
+    /// Cycles after the switch of an online change in which a program fault takes the change back; never where it is 0.
+    pub trial_cycles: u32,
     /// y(i) after that.
     pub fail_safe: Image,
     /// Numeric outputs that move to their fail-safe values by a ramp.

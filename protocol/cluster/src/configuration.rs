@@ -12,6 +12,7 @@ use understudy_wire::ProgramId;
 use crate::canonical::circuit_text;
 use crate::cluster::Cluster;
 use crate::code::Code;
+use crate::format::TRIAL_CYCLES;
 use crate::source::{InputSource, InputSourceKind};
 
 /// Raised when equal texts would mean something else than before.
@@ -53,6 +54,10 @@ pub(crate) fn configuration_text(
         line(format_args!("{}", indented(&program_text(&controller.code))));
         line(format_args!("remote io {}", remote_io.name));
         line(format_args!("  hold {}", remote_io.hold_cycles));
+        // As it was before there was a choice, so that such a cluster keeps its hash.
+        if remote_io.trial_cycles != TRIAL_CYCLES {
+            line(format_args!("  trial {}", remote_io.trial_cycles));
+        }
         line(format_args!("  fail-safe {}", remote_io.fail_safe));
         for ramp in &remote_io.ramps {
             let bit = ramp.place.bit;

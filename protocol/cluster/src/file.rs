@@ -95,6 +95,7 @@ pub(crate) struct RemoteIoSection {
     pub(crate) name: Option<Placed<String>>,
     pub(crate) controller: Option<Placed<String>>,
     pub(crate) hold_cycles: u32,
+    pub(crate) trial_cycles: u32,
     pub(crate) fail_safe: Vec<(Placed<String>, Constant)>,
     pub(crate) ramp: Vec<(Placed<String>, Constant)>,
     /// Index into [`crate::format::RELEASES`].
@@ -203,6 +204,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             name: fields.name("name", diagnostics),
             controller: fields.text("controller", diagnostics),
             hold_cycles: fields.count("hold_cycles", diagnostics),
+            trial_cycles: fields.count("trial_cycles", diagnostics),
             fail_safe: fields.values("fail_safe", diagnostics),
             ramp: fields.values("ramp", diagnostics),
             release: fields.word("release", diagnostics),

@@ -108,6 +108,9 @@ macro_rules! keys {
 /// Cycles in one number of the file, at most.
 const MANY_CYCLES: u32 = 100_000;
 
+/// Cycles after the switch of an online change in which a program fault takes it back, where the file does not say.
+pub(crate) const TRIAL_CYCLES: u32 = 100;
+
 pub(crate) const MODES: [&str; 2] = ["full", "paper"];
 pub(crate) const SCHEDULES: [&str; 2] = ["token", "parallel"];
 pub(crate) const LINKS: [&str; 2] = ["udp", "zenoh"];
@@ -188,6 +191,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         key value_fault: word(&VALUE_FAULTS), "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them";
         key stale_state: word(&STALE_STATES), "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state";
         key restart: word(&RESTARTS), "how a program with retentive variables starts after a power failure, where no station holds its state: `warm`, from its initial state with the values that a station has kept; `cold`, from its initial state; `operator`, the operator chooses";
+        key trial_cycles: count(0, MANY_CYCLES, TRIAL_CYCLES), "cycles after the switch of an [online change](../how-to/online-change.md) in which a program fault takes the change back by itself; 0: never";
         key diagnosis: Kind::Text, "the file of a ladder that detects failed input channels, relative to the cluster file, see [reconfiguration](reconfiguration.md)";
         key inputs: Kind::Sources, "inputs that do not come from the field: operators write them, or another program computes them, see below";
         key field: Kind::Device, "real equipment behind it, see below; without it its plant is simulated";

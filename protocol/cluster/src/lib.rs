@@ -38,8 +38,8 @@ pub use address::{
 };
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use change::{
-    ChangeError, ChangeTexts, ChangedInitial, ChangedText, NeedsStop, OnlineChanges, ProgramText,
-    Unfit, changed_initials, fates,
+    ChangeError, ChangeTexts, ChangedInitial, ChangedSetting, ChangedText, NeedsStop,
+    OnlineChanges, ProgramText, Unfit, changed_initials, fates,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Twin, Understudy};
 pub use code::{Code, Unnamed};

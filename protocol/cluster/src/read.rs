@@ -360,6 +360,7 @@ fn remote_ios(
                 name
             }),
             hold_cycles: section.hold_cycles,
+            trial_cycles: section.trial_cycles,
             fail_safe,
             ramps,
             release: [Release::Automatic, Release::Operator][section.release],
@@ -405,6 +406,7 @@ fn remote_ios(
             RemoteIo {
                 name,
                 hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
+                trial_cycles: crate::format::REMOTE_IO.default_count("trial_cycles"),
                 fail_safe: fail_safe::values(member, &[], diagnostics),
                 ramps: Vec::new(),
                 release: Release::default(),

@@ -62,6 +62,7 @@ impl Cluster {
             stop: controller.stop_points(),
             diagnosis: remote_io.diagnosis.as_ref().map(|it| Arc::clone(&it.compiled)),
             hold_cycles: remote_io.hold_cycles,
+            trial_cycles: remote_io.trial_cycles,
             fail_safe: remote_io.fail_safe.clone(),
             ramps: remote_io.ramps.clone(),
             release: remote_io.release,

@@ -15,7 +15,9 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use understudy_executable::Executable;
-use understudy_wire::{ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId};
+use understudy_wire::{
+    ChangeName, ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId,
+};
 
 /// Compiled program of the cluster.
 #[derive(Debug, Clone)]
@@ -30,6 +32,10 @@ pub struct Program {
 pub trait Conversion: Debug + Send + Sync {
     /// The state for the packed `state`: a function of both programs and of the state, so all stations compute the same.
     fn convert(&self, state: &[u64]) -> Vec<u64>;
+
+    /// Releases the program of a converted state that a fault has stopped, where `inputs`, those of the sample that changes the program, reset it: it
+    /// goes on with the values of before the scan of the fault, and not with the initial ones.
+    fn release(&self, state: &mut [u64], inputs: &[u64]);
 }
 
 /// One program that a change replaces, with the way there and back.
@@ -59,6 +65,11 @@ pub struct OnlineChange {
 }
 
 impl OnlineChange {
+    /// The two configurations.
+    pub fn name(&self) -> ChangeName {
+        ChangeName { before: self.before, after: self.after }
+    }
+
     /// What it does to a program; none where that stays.
     pub fn of(&self, program: ProgramId) -> Option<&ProgramChange> {
         self.programs.iter().find(|change| change.program == program)
@@ -111,21 +122,29 @@ impl<'a> Versions<'a> {
         self.first.executable.input_count()
     }
 
-    /// The first state of `to` for the state of `from`; none where one of them is not loaded.
-    pub fn convert(self, from: ProgramHash, to: ProgramHash, state: &[u64]) -> Option<Vec<u64>> {
+    /// The first state of `to`, at a sample with these inputs, for the state of `from`; none where one of them is not loaded.
+    pub fn convert(
+        self,
+        (from, to): (ProgramHash, ProgramHash),
+        state: &[u64],
+        inputs: &[u64],
+    ) -> Option<Vec<u64>> {
         let change = self.change?;
-        match (change.before.hash, change.after.hash) {
-            hashes if hashes == (from, to) => Some(change.forward.convert(state)),
-            hashes if hashes == (to, from) => Some(change.back.convert(state)),
-            _ => None,
-        }
+        let conversion = match (change.before.hash, change.after.hash) {
+            hashes if hashes == (from, to) => &change.forward,
+            hashes if hashes == (to, from) => &change.back,
+            _ => return None,
+        };
+        let mut state = conversion.convert(state);
+        conversion.release(&mut state, inputs);
+        Some(state)
     }
 }
 
 /// Two changes are equal that lead from one configuration to the same other one.
 impl PartialEq for OnlineChange {
     fn eq(&self, other: &Self) -> bool {
-        (self.before, self.after) == (other.before, other.after)
+        self.name() == other.name()
     }
 }
 
@@ -136,12 +155,12 @@ impl Eq for OnlineChange {}
 pub enum ChangeOrder {
     /// The change is loaded: both its programs are known from now on.
     Prepare(Arc<OnlineChange>),
-    /// The program of this remote I/O becomes the one with this hash, with the next sample.
-    Switch(ProgramHash),
+    /// In this change, the program of this remote I/O becomes the one with this hash, with the next sample.
+    Switch(ChangeName, ProgramHash),
     /// This configuration, one of the two of the change, is the member's own from now on.
-    Run(ConfigurationHash),
+    Run(ChangeName, ConfigurationHash),
     /// The change is over: this configuration, which the member runs, is the only one from now on.
-    Forget(ConfigurationHash),
+    Forget(ChangeName, ConfigurationHash),
 }
 
 /// What a member knows of an online change.
@@ -164,6 +183,11 @@ impl Changing {
             .as_ref()
             .map(|change| if change.before == self.own { change.after } else { change.before });
         Configurations { own: self.own, prepared }
+    }
+
+    /// Whether it has loaded this change.
+    pub fn has_loaded(&self, name: ChangeName) -> bool {
+        self.change.as_ref().is_some_and(|change| change.name() == name)
     }
 
     /// The change that it has loaded.
@@ -191,20 +215,23 @@ impl Changing {
                 }
                 None => return Err(OrderRefusal::OtherConfiguration { own: self.own }),
             },
-            ChangeOrder::Run(configuration) => {
-                let Configurations { own, prepared } = self.configurations();
-                if own != *configuration && prepared != Some(*configuration) {
+            ChangeOrder::Run(_, configuration) if *configuration == self.own => {}
+            ChangeOrder::Run(name, configuration) => {
+                let is_known = self.has_loaded(*name) && name.has(*configuration);
+                if !is_known {
                     return Err(OrderRefusal::NotPrepared);
                 }
                 self.own = *configuration;
             }
-            ChangeOrder::Forget(kept) if *kept != self.own => {
+            ChangeOrder::Forget(_, kept) if *kept != self.own => {
                 return Err(OrderRefusal::OtherConfiguration { own: self.own });
             }
-            ChangeOrder::Forget(_) if !may_forget => return Err(OrderRefusal::StillNeeded),
-            ChangeOrder::Forget(_) => self.change = None,
+            // That change is over here, and another one may be going on.
+            ChangeOrder::Forget(name, _) if !self.has_loaded(*name) => {}
+            ChangeOrder::Forget(..) if !may_forget => return Err(OrderRefusal::StillNeeded),
+            ChangeOrder::Forget(..) => self.change = None,
             // A remote I/O makes change marks, and takes this order itself.
-            ChangeOrder::Switch(_) => return Err(OrderRefusal::NotRunning),
+            ChangeOrder::Switch(..) => return Err(OrderRefusal::NotRunning),
         }
         Ok(())
     }
@@ -214,5 +241,47 @@ impl Changing {
 impl Hash for Changing {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         self.configurations().hash(hasher);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ONE: ConfigurationHash = ConfigurationHash(1);
+    const TWO: ConfigurationHash = ConfigurationHash(2);
+    const THREE: ConfigurationHash = ConfigurationHash(3);
+
+    fn change(before: ConfigurationHash, after: ConfigurationHash) -> OnlineChange {
+        OnlineChange { before, after, programs: Vec::new() }
+    }
+
+    /// An engineer ends the change from 1 to 2 once more while the one from 2 to 3 is prepared, or accepted: nothing of the latter changes.
+    #[test]
+    fn a_step_of_a_change_that_is_over_does_nothing_to_the_next_one() {
+        let old = change(ONE, TWO).name();
+        let next = change(TWO, THREE);
+        for accepts in [false, true] {
+            let mut changing = Changing::new(TWO);
+            changing.take(&ChangeOrder::Prepare(Arc::new(next.clone())), true).expect("loaded");
+            if accepts {
+                changing.take(&ChangeOrder::Run(next.name(), THREE), true).expect("accepted");
+            }
+            let before = changing.configurations();
+            for order in [
+                ChangeOrder::Forget(old, TWO),
+                ChangeOrder::Forget(old, ONE),
+                ChangeOrder::Run(old, TWO),
+                ChangeOrder::Run(old, ONE),
+            ] {
+                let is_done = changing.take(&order, true).is_ok();
+                let ends = matches!(order, ChangeOrder::Forget(_, TWO) | ChangeOrder::Run(_, TWO));
+                assert_eq!(is_done, ends && !accepts, "{order:?}");
+                assert_eq!(changing.configurations(), before, "{order:?}");
+            }
+            let kept = if accepts { THREE } else { TWO };
+            changing.take(&ChangeOrder::Forget(next.name(), kept), true).expect("it ends");
+            assert_eq!(changing.configurations(), Configurations { own: kept, prepared: None });
+        }
     }
 }

@@ -133,9 +133,13 @@ impl<Event: From<Refusal>> Endpoint<Event> {
         Configurations { own, prepared }: Configurations,
     ) -> Result<(), OrderRefusal> {
         let changing = &mut self.changing;
+        let name = change.name();
         changing.take(&ChangeOrder::Prepare(change), true)?;
-        changing.take(&ChangeOrder::Run(own), true)?;
-        if prepared.is_none() { changing.take(&ChangeOrder::Forget(own), true) } else { Ok(()) }
+        changing.take(&ChangeOrder::Run(name, own), true)?;
+        match prepared {
+            Some(_) => Ok(()),
+            None => changing.take(&ChangeOrder::Forget(name, own), true),
+        }
     }
 
     /// Its configuration, and the one that it has loaded beside it.

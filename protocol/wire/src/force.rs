@@ -207,9 +207,14 @@ pub enum OrderRefusal {
     NotRunning,
     /// The program, or a member that is received, still is that of the other configuration.
     #[error(
-        "the other configuration is still needed: by a program that was not switched, or by a member that is received and has not accepted"
+        "the other configuration is still needed: by a program that was not switched or is on trial, or by a member that is received and has not accepted"
     )]
     StillNeeded,
+    /// A program fault has taken the change back.
+    #[error(
+        "a program fault has taken the change back, and the program of before runs: end the change with `cancel`, or switch again"
+    )]
+    TakenBack,
 }
 
 fn stations_text(stations: StationSet) -> String {
@@ -230,6 +235,7 @@ impl OrderRefusal {
             | Self::OtherConfiguration { .. }
             | Self::NotPrepared
             | Self::IsOver
+            | Self::TakenBack
             | Self::NotRunning => "U0632",
             Self::StillNeeded => "U0634",
             Self::StationsNotPrepared { .. } => "U0636",

@@ -20,7 +20,7 @@ mod via;
 mod write;
 
 pub use audience::{Audience, Roster, Topic, ZENOH_PORT_OFFSET};
-pub use change::ChangeRequest;
+pub use change::{ChangeName, ChangeRequest};
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
     Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,

@@ -4,11 +4,75 @@ use std::sync::Arc;
 
 use understudy_cycle::{ChangeOrder, OnlineChange, Output};
 use understudy_wire::{
-    ConfigurationHash, Configurations, Header, OrderRefusal, ProgramHash, StationId, StationSet,
-    Time,
+    ChangeName, ConfigurationHash, Configurations, Header, OrderRefusal, ProgramHash, StationId,
+    StationSet, Time,
 };
 
-use super::RemoteIo;
+use super::{Execution, RemoteIo};
+use crate::event::Event;
+use crate::history::History;
+
+/// What this remote I/O does in an online change.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub(super) struct Replacing {
+    /// The program that the change wants; a change mark that becomes void is made again.
+    wanted: Option<ProgramHash>,
+    /// Stations that have loaded the change, as their newest frames say.
+    prepared: StationSet,
+    trial: Trial,
+}
+
+/// Whether a fault of the new program takes the change back by itself.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+enum Trial {
+    /// It does not.
+    #[default]
+    None,
+    /// It does.
+    Running {
+        /// The program before.
+        from: ProgramHash,
+        /// The newest sample and this number of further ones belong to the trial, counted from 1.
+        left: u32,
+        /// Whether the program was seen running, so that a fault is one of the new program and not of the one before.
+        runs: bool,
+    },
+    /// It has.
+    TakenBack,
+}
+
+impl Replacing {
+    /// The program that takes the next sample of this history, where that changes, and whether the sample resets the program. A sample that does both
+    /// releases a program that a fault has stopped ([`understudy_cycle::Conversion::release`]); a release by the operator is a sample of its own.
+    pub(super) fn next(
+        &self,
+        history: &History,
+        execution: Execution,
+    ) -> (Option<ProgramHash>, bool) {
+        let is_restarting = execution == Execution::Restarting;
+        let is_possible = !is_restarting && !history.is_full_of_changes();
+        let change = self.wanted.filter(|wanted| is_possible && history.program() != Some(*wanted));
+        let takes_back = change.is_some() && self.trial == Trial::TakenBack;
+        (change, is_restarting || takes_back && execution == Execution::Stopped)
+    }
+
+    /// A sample was taken that no change mark made one of another program.
+    fn sampled(&mut self) {
+        if let Trial::Running { left, .. } = &mut self.trial {
+            *left -= 1;
+            if *left == 0 {
+                self.trial = Trial::None;
+            }
+        }
+    }
+
+    /// The outputs of a program that is not stopped were proved.
+    pub(super) fn runs(&mut self) {
+        if let Trial::Running { runs, .. } = &mut self.trial {
+            *runs = true;
+        }
+    }
+}
 
 impl RemoteIo {
     /// It had loaded a change before it was started, with these configurations; before [`Self::noting`]. Without effect where the change is not of
@@ -51,18 +115,19 @@ impl RemoteIo {
         let Configurations { own, prepared } = self.member.changing().configurations();
         let theirs = [Some(header.configuration), header.prepared];
         if prepared.is_some() && theirs.contains(&Some(own)) && theirs.contains(&prepared) {
-            self.prepared.insert(station);
+            self.replacing.prepared.insert(station);
         } else {
-            self.prepared.remove(station);
+            self.replacing.prepared.remove(station);
         }
     }
 
     /// Moves an online change on.
     pub(super) fn take_change(&mut self, now: Time, order: &ChangeOrder) {
-        if let ChangeOrder::Switch(to) = order {
-            let outcome = self.may_switch(*to);
-            if outcome.is_ok() {
-                self.wanted = Some(*to);
+        if let ChangeOrder::Switch(change, to) = order {
+            let outcome = self.may_switch(*change, *to);
+            if outcome.is_ok() && self.replacing.wanted != Some(*to) {
+                self.replacing.wanted = Some(*to);
+                self.replacing.trial = Trial::None;
             }
             return self.member.put(Output::Obeyed(outcome));
         }
@@ -70,6 +135,9 @@ impl RemoteIo {
             && self.has_left_behind(change)
         {
             return self.member.put(Output::Obeyed(Err(OrderRefusal::IsOver)));
+        }
+        if let Some(refusal) = self.refusal_of_trial(order) {
+            return self.member.put(Output::Obeyed(Err(refusal)));
         }
         let own = self.hash();
         let may_forget = self.knowledge.run().is_none_or(|run| run.history.is_of(own));
@@ -79,8 +147,65 @@ impl RemoteIo {
         if let (Some(change), None) = (before, changing.change()) {
             let own = changing.configurations().own;
             self.adopt(&change, own);
-            self.wanted = None;
-            self.prepared = StationSet::EMPTY;
+            self.replacing = Replacing::default();
+        }
+    }
+
+    /// A program that is on trial is not accepted yet, and one that was taken back is not accepted at all.
+    fn refusal_of_trial(&self, order: &ChangeOrder) -> Option<OrderRefusal> {
+        let (ChangeOrder::Run(name, configuration) | ChangeOrder::Forget(name, configuration)) =
+            order
+        else {
+            return None;
+        };
+        let change = self.member.changing().change().filter(|change| change.name() == *name)?;
+        let accepted = change.program_in(*configuration, self.settings.program)?.hash;
+        let Replacing { wanted, trial, .. } = self.replacing;
+        // The trial begins with the change mark.
+        let is_ahead = wanted == Some(accepted)
+            && self.running().is_some_and(|running| running != accepted)
+            && self.is_tried(accepted);
+        match trial {
+            Trial::Running { from, .. } if accepted != from => Some(OrderRefusal::StillNeeded),
+            Trial::TakenBack if wanted != Some(accepted) => Some(OrderRefusal::TakenBack),
+            _ if is_ahead => Some(OrderRefusal::StillNeeded),
+            _ => None,
+        }
+    }
+
+    /// Whether a program that a change mark brings is on trial. What the program of its own configuration does is no matter of the change.
+    fn is_tried(&self, program: ProgramHash) -> bool {
+        program != self.hash() && self.settings.stop.is_some() && self.settings.trial_cycles > 0
+    }
+
+    /// A sample was taken, for the program `change` where that is another one than `from`.
+    pub(super) fn note_change(&mut self, from: Option<ProgramHash>, change: Option<ProgramHash>) {
+        let Some(to) = change else {
+            return self.replacing.sampled();
+        };
+        let left = self.settings.trial_cycles;
+        let is_tried = self.program == Execution::Running && self.is_tried(to);
+        if let Some(from) = from.filter(|_| is_tried) {
+            self.replacing.trial = Trial::Running { from, left, runs: self.missed == 0 };
+        }
+    }
+
+    /// A fault has stopped the program: where that is the new one of an online change, and on trial, the change is taken back with the next sample.
+    pub(super) fn take_back(&mut self) {
+        let Trial::Running { from: to, runs: true, .. } = self.replacing.trial else {
+            return;
+        };
+        let can_follow = self.holders.stations().any(|station| {
+            self.holders.is_living(station) && self.replacing.prepared.contains(station)
+        });
+        let (Some(from), true) = (self.running(), can_follow) else {
+            return;
+        };
+        if Some(from) == self.replacing.wanted {
+            self.replacing.wanted = Some(to);
+            self.replacing.trial = Trial::TakenBack;
+            let moment = self.moment();
+            self.report(Event::ChangeTakenBack { moment, from, to });
         }
     }
 
@@ -100,8 +225,8 @@ impl RemoteIo {
     }
 
     /// Whether the history may change to a program: no station that computes it now would be silent from then on.
-    fn may_switch(&self, to: ProgramHash) -> Result<(), OrderRefusal> {
-        let is_changed = self.member.changing().change().is_some() && self.is_loaded(to);
+    fn may_switch(&self, name: ChangeName, to: ProgramHash) -> Result<(), OrderRefusal> {
+        let is_changed = self.member.changing().has_loaded(name) && self.is_loaded(to);
         if !is_changed {
             return Err(OrderRefusal::NotPrepared);
         }
@@ -110,7 +235,7 @@ impl RemoteIo {
         }
         let living: StationSet =
             self.holders.stations().filter(|station| self.holders.is_living(*station)).collect();
-        let stations = living.without(self.prepared);
+        let stations = living.without(self.replacing.prepared);
         if stations.is_empty() {
             Ok(())
         } else {

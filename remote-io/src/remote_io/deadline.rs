@@ -100,11 +100,13 @@ impl RemoteIo {
         };
         if !outputs.get(stop.stopped) {
             self.program = Execution::Running;
+            self.replacing.runs();
             return selection;
         }
         if self.program == Execution::Running {
             self.program = Execution::Stopped;
         }
+        self.take_back();
         Selection::Missing(Missing::ProgramFault)
     }
 

@@ -37,14 +37,13 @@ impl Hash for RemoteIo {
             program,
             trust,
             differed,
-            wanted,
-            prepared,
+            replacing,
         } = self;
         (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
         (writing, signals, noting, pairing).hash(hasher);
         (looked, resumed, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, descent, program, trust, differed).hash(hasher);
-        (wanted, prepared).hash(hasher);
+        replacing.hash(hasher);
     }
 }

@@ -70,16 +70,15 @@ impl RemoteIo {
         self.writing.put(operator_inputs, history.newest(), &mut unforced);
         let validity = self.signals.put(&self.settings.signals, moment, &mut unforced);
         let mut inputs = self.forcing.inputs(unforced.clone());
+        let before_change = history.program();
+        let (change, resets) = self.replacing.next(history, self.program);
         if let Some(stop) = self.settings.stop
-            && self.program == Execution::Restarting
+            && resets
         {
             inputs.set(stop.reset, true);
             unforced.set(stop.reset, true);
             self.program = Execution::Stopped;
         }
-        let before_change = history.program();
-        let is_full = history.is_full_of_changes();
-        let change = self.wanted.filter(|wanted| before_change != Some(*wanted) && !is_full);
         history.push(Step { change, inputs: inputs.clone() });
         run.sampled = true;
 
@@ -112,6 +111,7 @@ impl RemoteIo {
         if let Some(noted) = noted {
             self.prepare_note(moment, after, noted);
         }
+        self.note_change(before_change, change);
         if let Some(to) = change {
             self.report(Event::ProgramChanged { moment, from: before_change, to });
         }

@@ -96,6 +96,7 @@ impl Bench {
             stop: None,
             diagnosis: None,
             hold_cycles: 2,
+            trial_cycles: 0,
             fail_safe: Image::zero(1),
             ramps: Vec::new(),
             release: Release::Operator,

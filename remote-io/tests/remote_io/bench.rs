@@ -47,6 +47,7 @@ pub(crate) fn settings(understudies: usize) -> Settings {
         stop: None,
         diagnosis: None,
         hold_cycles: 3,
+        trial_cycles: 0,
         fail_safe: Image::zero(1),
         ramps: Vec::new(),
         release: Release::Automatic,

@@ -102,9 +102,13 @@ impl Changes {
                     let texts = keeper.read(file)?;
                     ChangeOrder::Prepare(keeper.load(&texts)?)
                 }
-                ChangeRequest::Switch { to } => ChangeOrder::Switch(*to),
-                ChangeRequest::Run { configuration } => ChangeOrder::Run(*configuration),
-                ChangeRequest::Forget { configuration } => ChangeOrder::Forget(*configuration),
+                ChangeRequest::Switch { change, to } => ChangeOrder::Switch(*change, *to),
+                ChangeRequest::Run { change, configuration } => {
+                    ChangeOrder::Run(*change, *configuration)
+                }
+                ChangeRequest::Forget { change, configuration } => {
+                    ChangeOrder::Forget(*change, *configuration)
+                }
             };
             self.give(control, keeper, order)
         })
@@ -127,7 +131,7 @@ impl Changes {
         order: ChangeOrder,
     ) -> Result<String, String> {
         let answer = given(control, Order::Change(order.clone()));
-        if answer != DONE || matches!(order, ChangeOrder::Switch(_)) {
+        if answer != DONE || matches!(order, ChangeOrder::Switch(..)) {
             return Ok(answer);
         }
         let configurations = {

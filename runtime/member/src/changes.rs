@@ -11,7 +11,9 @@ use serde::{Deserialize, Serialize};
 use understudy_bus::{ChangeKeeper, Changes, FoundFile};
 use understudy_cluster::{ChangeError, ChangeTexts, Cluster};
 use understudy_cycle::OnlineChange;
-use understudy_wire::{ConfigurationHash, Configurations, ProgramHash, ProgramId};
+use understudy_wire::{
+    ChangeName, ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId,
+};
 
 use crate::run::MemberOptions;
 
@@ -25,6 +27,9 @@ struct KeptChanges {
     accepted: Vec<ChangeTexts>,
     /// The change that is going on, with the configurations of the member.
     current: Option<(ChangeTexts, Configurations)>,
+    /// The change that was accepted last: it is over, and is not loaded again.
+    #[serde(default)]
+    over: Option<ChangeName>,
 }
 
 /// What a member starts with.
@@ -107,6 +112,7 @@ impl Keeper {
             let known = kept.accepted.last().map(|texts| texts.after);
             let known = known.or(kept.current.as_ref().map(|(texts, _)| texts.before));
             let Some(known) = known else {
+                self.kept.over = kept.over;
                 return Ok(None);
             };
             return Err(format!(
@@ -143,6 +149,9 @@ impl Keeper {
         let Some((texts, _)) = self.kept.current.take() else {
             return Ok(());
         };
+        if own == texts.after {
+            self.kept.over = Some(texts.name());
+        }
         if own != self.cluster.agreement().configuration {
             self.cluster = self.cluster.changed(&texts, own)?;
             match self.kept.accepted.last() {
@@ -161,6 +170,11 @@ impl ChangeKeeper for Keeper {
     fn load(&mut self, texts: &str) -> Result<Arc<OnlineChange>, String> {
         let texts: ChangeTexts = serde_json::from_str(texts)
             .map_err(|error| format!("U0631: these are no texts of an online change: {error}"))?;
+        let runs_it = self.cluster.agreement().configuration == texts.after;
+        if runs_it && self.kept.current.is_none() && self.kept.over == Some(texts.name()) {
+            let refusal = OrderRefusal::IsOver;
+            return Err(format!("{}: {refusal}", refusal.code()));
+        }
         let change = texts.load(&self.cluster).map_err(|error| format!("U0631: {error}"))?;
         self.loaded = Some(texts);
         Ok(Arc::new(change))
@@ -186,7 +200,8 @@ impl ChangeKeeper for Keeper {
         if configurations.prepared.is_none() {
             self.end(configurations.own).map_err(|error| format!("U0631: {error}"))?;
         }
-        let is_empty = self.kept.accepted.is_empty() && self.kept.current.is_none();
+        let KeptChanges { accepted, current, over } = &self.kept;
+        let is_empty = accepted.is_empty() && current.is_none() && over.is_none();
         let kept = match &self.file {
             Some(file) if is_empty => remove(file),
             Some(file) => write(file, &self.kept),
@@ -289,6 +304,17 @@ mod tests {
         assert_eq!(known(&file, &first), alone(&third));
         assert_eq!(known(&file, &second), alone(&third));
         assert_eq!(known(&file, &third), alone(&third));
+        // What was accepted is over, also for a member that starts again, with whichever file.
+        let load = |keeper: &mut Keeper, before: &Cluster, after: &Cluster| {
+            let texts = ChangeTexts::between(before, after).expect("only a program differs");
+            keeper.load(&serde_json::to_string(&texts).expect("JSON")).map(|_| ())
+        };
+        for started in [&first, &second, &third] {
+            let mut again = start(&file, started).1;
+            let refused = load(&mut again, &second, &third).expect_err("it is over");
+            assert!(refused.starts_with("U0632: "), "{refused}");
+            load(&mut again, &third, &second).expect("the change back is another one");
+        }
         // One that was cancelled leaves nothing, and one back undoes the one before it.
         prepare(&mut keeper, &third, &first);
         end(&mut keeper, &third);
@@ -296,6 +322,7 @@ mod tests {
         prepare(&mut keeper, &third, &second);
         end(&mut keeper, &second);
         assert_eq!(known(&file, &first), alone(&second));
+        load(&mut keeper, &second, &third).expect("it can be made again");
         // A cluster file of something else is not changed to what was accepted of another one.
         let other = cluster(7);
         let problem = start(&file, &other).0.expect_err("it is of other changes");

@@ -50,6 +50,8 @@ fn changed() -> Circuit {
 struct MoreRegisters(bool);
 
 impl Conversion for MoreRegisters {
+    fn release(&self, _: &mut [u64], _: &[u64]) {}
+
     fn convert(&self, state: &[u64]) -> Vec<u64> {
         vec![state[0] & 0b11 | u64::from(self.0) << 2]
     }
@@ -145,6 +147,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         stop: None,
         diagnosis: None,
         hold_cycles: 1,
+        trial_cycles: 0,
         fail_safe: Image::zero(1),
         ramps: Vec::new(),
         release: Release::Automatic,

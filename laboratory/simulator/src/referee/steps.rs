@@ -48,7 +48,7 @@ impl Referee {
             return self.misses_records();
         };
         if hash != before {
-            let converted = versions.convert(before, hash, bits.words());
+            let converted = versions.convert((before, hash), bits.words(), step.inputs.words());
             let converted = converted
                 .and_then(|words| Image::from_words(program.executable.state_count(), &words).ok());
             let Some(converted) = converted else {

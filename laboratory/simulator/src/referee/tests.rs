@@ -45,6 +45,7 @@ fn referee() -> Referee {
         stop: None,
         diagnosis: None,
         hold_cycles: 2,
+        trial_cycles: 0,
         fail_safe: Image::zero(1),
         ramps: Vec::new(),
         release: Release::Automatic,

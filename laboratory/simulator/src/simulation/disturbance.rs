@@ -95,19 +95,20 @@ impl Simulation {
             return;
         };
         let changed = |program: ProgramId| change.of(program);
+        let name = change.name();
         let order = match (step, member) {
             (ChangeStep::Prepare, _) => Some(ChangeOrder::Prepare(Arc::clone(&change))),
             (ChangeStep::Switch, Member::RemoteIo(program)) => {
-                changed(program).map(|it| ChangeOrder::Switch(it.after.hash))
+                changed(program).map(|it| ChangeOrder::Switch(name, it.after.hash))
             }
             (ChangeStep::SwitchBack, Member::RemoteIo(program)) => {
-                changed(program).map(|it| ChangeOrder::Switch(it.before.hash))
+                changed(program).map(|it| ChangeOrder::Switch(name, it.before.hash))
             }
             (ChangeStep::Switch | ChangeStep::SwitchBack, _) => None,
-            (ChangeStep::Accept, _) => Some(ChangeOrder::Run(change.after)),
-            (ChangeStep::TakeBack, _) => Some(ChangeOrder::Run(change.before)),
-            (ChangeStep::Forget, _) => Some(ChangeOrder::Forget(change.after)),
-            (ChangeStep::ForgetNew, _) => Some(ChangeOrder::Forget(change.before)),
+            (ChangeStep::Accept, _) => Some(ChangeOrder::Run(name, change.after)),
+            (ChangeStep::TakeBack, _) => Some(ChangeOrder::Run(name, change.before)),
+            (ChangeStep::Forget, _) => Some(ChangeOrder::Forget(name, change.after)),
+            (ChangeStep::ForgetNew, _) => Some(ChangeOrder::Forget(name, change.before)),
         };
         if let Some(order) = order {
             self.give(member, Input::Change(&order), observe);

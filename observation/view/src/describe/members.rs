@@ -122,6 +122,9 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
     Configured(configurations) => "configured" Notice configured_text(*configurations);
     ProgramChanged { to, .. } => "program-changed" Notice format!("its program is {to} from this cycle on");
+    ChangeTakenBack { to, .. } => "change-taken-back" Alarm format!(
+        "a program fault takes the online change back: its program is {to} again; end the change with `cancel`, or correct the new program and switch again"
+    );
     Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
     PartChanged { part: Part::Follower, .. } => "part-changed" Notice

@@ -11,7 +11,8 @@ use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
 use crate::alarm::VALUE_FAULT;
 use crate::describe::{
-    PROGRAM_FAULT, force_text, missing_text, program_fault_text, program_name, source_text,
+    CHANGE_TAKEN_BACK, PROGRAM_FAULT, force_text, missing_text, program_fault_text, program_name,
+    source_text,
 };
 use crate::event::{Event, Level};
 use crate::stop::{self, Stop};
@@ -164,6 +165,15 @@ impl Model {
             }
             RemoteIoEvent::ConfigurationDisputed { .. } => {
                 alarm = Some("configuration-disputed");
+                None
+            }
+            RemoteIoEvent::ChangeTakenBack { .. } => {
+                alarm = Some(CHANGE_TAKEN_BACK);
+                None
+            }
+            // The engineer has moved the change on.
+            RemoteIoEvent::Configured(_) => {
+                self.alarms.all_over(&record.name, &[CHANGE_TAKEN_BACK], cycle);
                 None
             }
             RemoteIoEvent::AdoptedLineage { .. } | RemoteIoEvent::StateRecovered { .. } => {

@@ -75,7 +75,7 @@ fn whatever_matters_is_in_the_hash() {
     let twin = |wiring: &str| {
         format!("controller = \"press\"\ntwin = {{ name = \"two\", wiring = \"{wiring}\" }}\n")
     };
-    let different: [&[(&str, &str, &str)]; 27] = [
+    let different: [&[(&str, &str, &str)]; 28] = [
         &[(FILE, "\"press-cell\"", "\"press-cell-2\"")],
         &[(FILE, "10ms", "11ms")],
         &[(FILE, "period", "mode = \"paper\"\nperiod")],
@@ -90,6 +90,7 @@ fn whatever_matters_is_in_the_hash() {
         &[(FILE, "grip = true", "grip = false")],
         &[(FILE, "grip = true", "move_up = true")],
         &[(FILE, "controller = \"press\"\n", "controller = \"press\"\nhold_cycles = 4\n")],
+        &[(FILE, "controller = \"press\"\n", "controller = \"press\"\ntrial_cycles = 0\n")],
         &[(FILE, "controller = \"press\"\n", "controller = \"press\"\nrelease = \"operator\"\n")],
         &[(FILE, "controller = \"press\"\n", &twin("exclusive"))],
         &[(FILE, "controller = \"press\"\n", &twin("parallel"))],

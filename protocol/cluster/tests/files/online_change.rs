@@ -334,3 +334,57 @@ fn a_chart_goes_on_in_its_active_step() {
         assert_eq!(running.step(&[0])[0] & 1, 0, "it is over as before");
     }
 }
+
+/// What differs beside the programs is said in the words of the cluster file, all of it.
+#[test]
+fn settings_that_need_a_stop_are_named_as_in_the_file() {
+    let program =
+        "program one\ninput a\noutput y = 0\noutput z\nrung\n    a ( y )\nrung\n    a ( z )\n";
+    let file = "[cluster]\nname = \"cell\"\nperiod = \"10ms\"\n[[controller]]\nname = \"one\"\nladder = \"one.ladder\"\n[[remote_io]]\ncontroller = \"one\"\n";
+    let cluster = |text: &str| {
+        let loaded = load(text, &[("one.ladder", program)]);
+        loaded.cluster.unwrap_or_else(|| panic!("{:?}\n{text}", loaded.reports))
+    };
+    let reasons = |from: &str, to: &str| {
+        let changed = file.replace(from, to);
+        assert_ne!(changed, file);
+        let reasons = ChangeTexts::between(&cluster(file), &cluster(&changed));
+        let reasons = reasons.expect_err("it needs a stop");
+        reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+    };
+    let remote_io = "controller = \"one\"\n";
+    let with = |keys: &str| format!("{remote_io}{keys}\n");
+    let second = "[[controller]]\nname = \"two\"\nladder = \"one.ladder\"\n[[remote_io]]";
+    for (from, to, expected) in [
+        ("10ms", "20ms".to_owned(), "`period` of the cluster changes from `10ms` to `20ms`"),
+        (
+            remote_io,
+            with("hold_cycles = 5"),
+            "`hold_cycles` of remote I/O `one-io` changes from `3` to `5`",
+        ),
+        (
+            remote_io,
+            with("hold_cycles = 5\nvalue_fault = \"fail-safe\""),
+            "`hold_cycles` of remote I/O `one-io` changes from `3` to `5`; `value_fault` of remote I/O `one-io` changes from `hold` to `fail-safe`",
+        ),
+        (remote_io, with("trial_cycles = 7"), "`trial_cycles` of remote I/O `one-io` changes"),
+        (remote_io, with("fail_safe = { z = true }"), "`fail_safe` of remote I/O `one-io` changes"),
+        (
+            remote_io,
+            with("inputs = { a = { operator = \"level\" } }"),
+            "`inputs` of remote I/O `one-io` changes",
+        ),
+        (
+            "[[remote_io]]",
+            second.to_owned(),
+            "only the new file has controller `two`; only the new file has remote I/O `two-io`",
+        ),
+        (
+            "[[remote_io]]",
+            "[[understudy]]\nname = \"more\"\n[[remote_io]]".to_owned(),
+            "only the old file has understudy `understudy`; only the new file has understudy `more`",
+        ),
+    ] {
+        assert_eq!(reasons(from, &to), expected, "{to}");
+    }
+}
