@@ -4,7 +4,9 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use crate::cell::{CellRow, cells_text, compare_cells};
+use crate::cell::{
+    CellRow, SinglePoint, cells_text, compare_cells, left_out, single_points, single_points_text,
+};
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
 use crate::options::Options;
@@ -17,7 +19,7 @@ use crate::transient::AfterFailure;
 pub struct Answer {
     /// The options of the calculation.
     pub options: Options,
-    /// Stations of the cluster; and its remote I/Os and networks, as far as their times are given.
+    /// Stations of the cluster; and its remote I/Os, field devices and networks, as far as their times are given.
     pub boxes: u32,
     /// The paper's model with one spare, (20).
     pub mttf_paper_hours: f64,
@@ -31,8 +33,12 @@ pub struct Answer {
     pub mttf_tmr_hours: f64,
     /// Standard deviation of the cluster's time to failure.
     pub deviation_cluster_hours: Option<f64>,
-    /// Whole cells; empty where neither remote I/Os nor networks have times.
+    /// Whole cells; empty where stations alone have times.
     pub cells: Vec<CellRow>,
+    /// Parts of the model of which each one stops this cell.
+    pub single_points: Vec<SinglePoint>,
+    /// Parts that the model leaves out, redundant or not.
+    pub left_out: Vec<&'static str>,
     /// Results at the end of the mission.
     #[serde(flatten)]
     pub mission: Option<Mission>,
@@ -143,6 +149,8 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
         mttf_tmr_hours: tmr.mttf().map_err(one)?,
         deviation_cluster_hours: moments.map(|moments| moments.variance_hours_squared.sqrt()),
         cells: compare_cells(options)?,
+        single_points: single_points(options),
+        left_out: left_out(options),
         mission,
     })
 }
@@ -232,7 +240,8 @@ impl Answer {
             );
         }
         if !self.cells.is_empty() {
-            let _ = write!(text, "\n{}", cells_text(&self.cells));
+            let single = single_points_text(&self.single_points, &self.left_out);
+            let _ = write!(text, "\n{}{single}", cells_text(&self.cells));
         }
         text
     }

@@ -5,7 +5,7 @@
 
 use crate::chain::{Chain, explore};
 use crate::error::ReliabilityError;
-use crate::parts::{Positions, detected, steps};
+use crate::positions::{PairRates, Positions, chain_of, complete, steps, waiting};
 use crate::quantity::Hours;
 use crate::system::{CommonCause, CommonCauseConvention, MAXIMUM_MODEL_STATES, System};
 use crate::transient::AfterFailure;
@@ -46,8 +46,8 @@ impl System {
             Ok(found) => Ok((chain.failure_density(&found), found)),
             Err(error) => Err(vec![error]),
         };
-        let positions: u32 = kinds.iter().map(|kind| kind.count).sum();
-        let independent = self.crews.is_none_or(|crews| crews >= positions);
+        let most: u32 = kinds.iter().map(Positions::most_waiting).sum();
+        let independent = self.crews.is_none_or(|crews| crews >= most);
         if !independent {
             let (density, found) = at(self.chain_of_copies(&kinds, lethal)?)?;
             return Ok(Survival { working: found.working, failed: found.failed, density });
@@ -56,7 +56,7 @@ impl System {
         let mut hazard = lethal;
         for kind in kinds {
             let units = f64::from(kind.count);
-            let alone = self.chain_of_copies(&[Positions { count: 1, ..kind }], 0.0)?;
+            let alone = chain_of(&[kind.one()], 0.0)?;
             let (density, found) = at(alone)?;
             logarithm += units * found.log_working();
             hazard += units * density / found.working;
@@ -76,19 +76,18 @@ impl System {
         let (all, coverage) = (f64::from(copies), self.coverage.get());
         let controllers = self.controllers.iter().map(|kind| {
             let rate = kind.mtbf.rate() * alone;
-            Positions {
-                count: kind.count,
+            let rates = PairRates {
                 masked: all * rate * coverage,
                 unmasked: all * rate * (1.0 - coverage),
                 lacking: (all - 1.0) * rate,
-                repair_rate: kind.mttr.rate(),
-                detected_at_once: false,
-            }
+                repair: kind.mttr.rate(),
+                detection: self.detection.map(Hours::rate),
+            };
+            Positions::pairs(kind.count, rates)
         });
         let mut kinds: Vec<Positions> = Vec::new();
         for kind in controllers {
-            let known =
-                kinds.iter_mut().find(|known| Positions { count: kind.count, ..**known } == kind);
+            let known = kinds.iter_mut().find(|known| known.are_like(&kind));
             match known {
                 Some(known) => known.count += kind.count,
                 None => kinds.push(kind),
@@ -111,17 +110,16 @@ impl System {
         kinds: &[Positions],
         lethal: f64,
     ) -> Result<Chain, Vec<ReliabilityError>> {
-        let detection = self.detection.map(Hours::rate);
         let (chain, _) = explore(
-            vec![(0, 0); kinds.len()],
+            complete(kinds),
             MAXIMUM_MODEL_STATES,
             |_| String::new(),
             |state, found| {
                 if lethal > 0.0 {
                     found.push((None, lethal));
                 }
-                let attended = self.attended(detected(state));
-                steps(kinds, state, attended, detection, found);
+                let attended = self.attended(waiting(kinds, state));
+                steps(kinds, state, attended, found);
             },
         )?;
         Ok(chain)

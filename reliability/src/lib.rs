@@ -4,7 +4,7 @@
 //! (14) to (20). A chain gives mean times by elimination and transients by uniformisation. Invariant: probabilities and times are
 //! sums of terms that are not negative, so no result loses its digits, whatever the rates are.
 //!
-//! What everything depends on is in series with the stations: remote I/Os with or without twins, networks, power (`parts.rs`). [`compare_cells`]
+//! What everything depends on is in series with the stations: remote I/Os with or without twins, field devices, networks, power (`parts.rs`). [`compare_cells`]
 //! compares whole cells.
 //!
 //! Measured: estimates with exact intervals, a test of fit against the law that the model implies, and simulation of what is too rare to
@@ -31,6 +31,7 @@ mod measured;
 mod options;
 mod parts;
 mod poisson_weights;
+mod positions;
 mod quantity;
 mod report;
 mod sensitivity;
@@ -41,7 +42,7 @@ mod transient;
 pub use answer::{Answer, Mission, calculate};
 pub use boxes::{UNDERSTUDIES, UnequalBoxes};
 pub use campaign::{Assessment, Campaign, SystemFailure, assess};
-pub use cell::{CellRow, cells_text, compare_cells};
+pub use cell::{CellRow, SinglePoint, cells_text, compare_cells, left_out, single_points};
 pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};
 pub use chain_answer::{ByState, ChainAnswer, ChainMission, StateAnswer, answer_chain};
 pub use copies::Survival;
@@ -54,7 +55,9 @@ pub use measured::{
     Stopped, acceleration_bias, fit, mean_time, outlook, proportion, rare_event, times_to_failure,
 };
 pub use options::Options;
-pub use parts::{Networks, Pair, REMOTE_IO_PAIR, RemoteIos, SharedPart};
+pub use parts::{
+    FieldDevices, InCharge, LaneModules, Networks, Pair, REMOTE_IO_PAIR, RemoteIos, SharedPart,
+};
 pub use quantity::{
     Hours, MAXIMUM_HOURS, MINIMUM_HOURS, MINIMUM_PROBABILITY, Probability, grouped,
 };

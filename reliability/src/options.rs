@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::boxes::UnequalBoxes;
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
-use crate::parts::{Networks, RemoteIos, SharedPart, chain_of};
+use crate::parts::{FieldDevices, Networks, RemoteIos, SharedPart, chain_of_parts};
 use crate::quantity::{Hours, Probability};
 use crate::system::{BoxKind, CommonCause, CommonCauseConvention, Rule, System};
 
@@ -40,6 +40,8 @@ pub struct Options {
     pub shared: Vec<SharedPart>,
     /// Remote I/Os with their twins; nothing: they do not fail.
     pub remote_ios: Option<RemoteIos>,
+    /// Field devices; nothing: they do not fail.
+    pub field_devices: Option<FieldDevices>,
     /// Networks; nothing: they do not fail.
     pub networks: Option<Networks>,
     /// Mission time.
@@ -64,6 +66,7 @@ impl Options {
             convention: CommonCauseConvention::Additive,
             shared: Vec::new(),
             remote_ios: None,
+            field_devices: None,
             networks: None,
             mission: None,
         }
@@ -126,7 +129,10 @@ impl Options {
     /// All parts in series with the stations. Errors are added to `errors`.
     fn parts(&self, errors: &mut Vec<ReliabilityError>) -> Vec<SharedPart> {
         let mut parts = self.shared.clone();
-        parts.extend(self.remote_ios.iter().flat_map(|them| them.parts(errors)));
+        let devices = self.field_devices.as_ref();
+        parts.extend(self.remote_ios.iter().flat_map(|them| them.parts(devices, errors)));
+        let remote_ios_fail = self.remote_ios.is_some();
+        parts.extend(devices.iter().flat_map(|them| them.parts(remote_ios_fail, errors)));
         parts.extend(self.networks.iter().map(|them| them.part(self.groups, errors)));
         parts
     }
@@ -141,13 +147,20 @@ impl Options {
         if !errors.is_empty() {
             return Err(errors);
         }
-        if parts.is_empty() { Ok(None) } else { chain_of(&parts).map(Some) }
+        if parts.is_empty() { Ok(None) } else { chain_of_parts(&parts).map(Some) }
     }
 
-    /// Machines that are no stations: remote I/Os with their twins, and one switch for each network, as far as their times are given.
+    /// Whether anything but stations fails that a cell has of its own.
+    pub fn is_whole_cell(&self) -> bool {
+        self.remote_ios.is_some() || self.field_devices.is_some() || self.networks.is_some()
+    }
+
+    /// Boxes that are no stations: remote I/Os with their twins, field devices, and one switch for each network, as far as their times are given.
     pub fn other_boxes(&self) -> u32 {
         let networks = self.networks.map_or(0, |them| them.count.saturating_mul(self.groups));
-        self.remote_ios.map_or(0, |them| them.boxes()).saturating_add(networks)
+        let devices = self.field_devices.map_or(0, |them| them.boxes());
+        let remote_ios = self.remote_ios.map_or(0, |them| them.boxes());
+        remote_ios.saturating_add(devices).saturating_add(networks)
     }
 }
 

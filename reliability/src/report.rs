@@ -213,6 +213,15 @@ fn assumptions(options: &Options) -> Vec<String> {
             them.twins, them.count, them.mtbf, them.mttr, them.switchover, them.beta
         )),
     }
+    match options.field_devices {
+        None => said.push("Field devices do not fail.".into()),
+        Some(them) => said.push(format!(
+            "Of {} of {} programs each remote I/O has a field device of its own; a field device fails after {} on average and is repaired in {}. \
+             The first failure of a single one fails the system; that of one of two is masked with probability {}, and the share β = {} affects both, in \
+             addition.",
+            them.redundant, them.count, them.mtbf, them.mttr, them.coverage, them.beta
+        )),
+    }
     match options.networks {
         None => said.push("Networks do not fail.".into()),
         Some(them) if them.count > 1 => said.push(format!(

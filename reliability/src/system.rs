@@ -16,7 +16,8 @@ use serde::Serialize;
 
 use crate::chain::{Chain, explore};
 use crate::error::ReliabilityError;
-use crate::parts::{Lacking, Positions, SharedPart, detected, steps};
+use crate::parts::SharedPart;
+use crate::positions::{Lacking, Positions, complete, incomplete, steps, waiting};
 use crate::quantity::{Hours, Probability};
 
 /// Maximum number of stations of one system.
@@ -174,12 +175,12 @@ impl System {
             Groups { kinds: self.kinds(), numbers: HashMap::new(), states: Vec::new() };
         let whole = groups.number(vec![(0, 0); groups.kinds.len()]);
         let pairs: Vec<Positions> = self.pairs().collect();
-        let first: SystemState = (vec![(whole, self.groups)], vec![(0, 0); pairs.len()]);
+        let first: SystemState = (vec![(whole, self.groups)], complete(&pairs));
         let names = std::cell::RefCell::new(groups);
         let (chain, _) = explore(
             first,
             MAXIMUM_MODEL_STATES,
-            |state| names.borrow().name(state, self),
+            |state| names.borrow().name(state, &pairs, self),
             |state, found| self.successors(&mut names.borrow_mut(), &pairs, state, found),
         )?;
         Ok(chain)
@@ -272,9 +273,9 @@ impl System {
                 count * group.iter().map(|(_, detected)| detected).sum::<u32>()
             })
             .sum();
-        let attended = self.attended(stations + detected(lacking));
+        let attended = self.attended(stations + waiting(pairs, lacking));
         let mut of_pairs = Vec::new();
-        steps(pairs, lacking, attended, None, &mut of_pairs);
+        steps(pairs, lacking, attended, &mut of_pairs);
         found.extend(
             of_pairs
                 .into_iter()
@@ -357,7 +358,7 @@ impl Groups {
     }
 
     /// What is down, such as `2 controllers, 1 understudy`.
-    fn name(&self, (state, lacking): &SystemState, system: &System) -> String {
+    fn name(&self, (state, lacking): &SystemState, kinds: &[Positions], system: &System) -> String {
         if self.kinds.len() > 3 || state.len() > 3 {
             return String::new();
         }
@@ -392,7 +393,7 @@ impl Groups {
             }
         }
         let pairs = system.shared.iter().filter(|part| part.pair.is_some());
-        for (pair, (_, down)) in pairs.zip(lacking).filter(|(_, (_, down))| *down > 0) {
+        for (pair, down) in pairs.zip(incomplete(kinds, lacking)).filter(|(_, down)| *down > 0) {
             parts.push(format!("{down} × half of a {}", pair.name));
         }
         if parts.is_empty() { "all work".into() } else { parts.join("; ") }

@@ -96,7 +96,7 @@ impl Scenario {
 }
 
 /// Every action as scenario files write it, in the order in which they are explained.
-pub const ACTIONS: [&str; 24] = [
+pub const ACTIONS: [&str; 26] = [
     "crash",
     "restart",
     "restart-misconfigured",
@@ -121,6 +121,8 @@ pub const ACTIONS: [&str; 24] = [
     "flip-state",
     "flip-sample",
     "flip-word",
+    "stick-input",
+    "free-input",
 ];
 
 /// An action as scenario files write it.
@@ -140,10 +142,16 @@ pub(crate) fn action_text(member: Member, action: Action, members: &Members) -> 
             Some(signal) => format!("{word} {} := {}", signal.name, set_value(signal, value)),
             None => word.to_owned(),
         },
-        Action::Unset { input } => match set(member, input, members) {
-            Some(signal) => format!("{word} {}", signal.name),
+        Action::StickInput { input, value } => match set(member, input, members) {
+            Some(signal) => format!("{word} {} at {value}", signal.name),
             None => word.to_owned(),
         },
+        Action::Unset { input } | Action::FreeInput { input } => {
+            match set(member, input, members) {
+                Some(signal) => format!("{word} {}", signal.name),
+                None => word.to_owned(),
+            }
+        }
         Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", members.name(to)),
         Action::Unplug { network } | Action::Plug { network } => {
             format!("{word} network {network}")
@@ -178,10 +186,7 @@ pub(crate) fn written(
 
 /// The input that a step sets, by its first bit.
 pub(crate) fn set(member: Member, input: u16, members: &Members) -> Option<&NamedSignal> {
-    let Member::RemoteIo(program) = member else {
-        return None;
-    };
-    members.signal(program, SignalPlace::Input(input))
+    members.signal(member.sampled_program()?, SignalPlace::Input(input))
 }
 
 /// A value as scenario files write it.

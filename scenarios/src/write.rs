@@ -79,10 +79,16 @@ fn write_step(text: &mut String, step: &Fault, members: &Members) {
             }
             None => Ok(()),
         },
-        Action::Unset { input } => match set(step.member, input, members) {
-            Some(signal) => writeln!(text, "input = {}", quoted(&signal.name)),
+        Action::StickInput { input, value } => match set(step.member, input, members) {
+            Some(signal) => writeln!(text, "input = {}\nvalue = {value}", quoted(&signal.name)),
             None => Ok(()),
         },
+        Action::Unset { input } | Action::FreeInput { input } => {
+            match set(step.member, input, members) {
+                Some(signal) => writeln!(text, "input = {}", quoted(&signal.name)),
+                None => Ok(()),
+            }
+        }
         Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),
         Action::Unplug { network } | Action::Plug { network } => {
             writeln!(text, "network = {network}")

@@ -269,3 +269,67 @@ fn a_plant_is_placed_by_failure_domain_or_the_domains_are_named() {
     let document = understudy(&["allocate", PLANT, "--stock", "CPU 224=2", "--json"]).json();
     assert_eq!(document["failures"][0]["code"], "U0600", "{document:#}");
 }
+
+/// A remote I/O and its twin are never in one domain, nor one of them with a station that computes their program; where the plant has too few domains, it is
+/// said which share one.
+#[test]
+fn twins_are_placed_in_domains_of_their_own() {
+    let folder = empty_folder("allocate-twins");
+    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/twin-remote-io");
+    for file in ["robot.ladder", "press.ladder"] {
+        fs::copy(source.join(file), folder.join(file)).expect("whole");
+    }
+    let cluster = fs::read_to_string(source.join("parallel.toml")).expect("whole");
+    let slot = "[[understudy]]\nname = \"spare\"\nspare = true\n\n[[remote_io]]";
+    fs::write(folder.join("cluster.toml"), cluster.replacen("[[remote_io]]", slot, 1))
+        .expect("it is ours");
+    let plant_of = |machines: &[(&str, &str)]| {
+        let mut text = "[[group]]\nname = \"cell\"\ncluster = \"cluster.toml\"\n\
+            [[spare]]\nname = \"spare-1\"\ngroups = { cell = \"spare\" }\n"
+            .to_owned();
+        for (number, (rack, more)) in machines.iter().enumerate() {
+            text += &format!("[[machine]]\nname = \"m{number}\"\nrack = \"{rack}\"\n{more}\n");
+        }
+        let plant = folder.join("plant.toml");
+        fs::write(&plant, text).expect("it is ours");
+        plant.to_str().expect("text").to_owned()
+    };
+    let (room, none) = ("remote_ios = 2", "");
+    // Remote I/Os in racks of their own; next to a station of the other program; and where two racks are too few for the stations.
+    let apart =
+        [("r1", none), ("r2", none), ("r3", none), ("r4", none), ("r5", room), ("r6", room)];
+    let shared = [("r1", room), ("r2", room), ("r3", room), ("r4", none)];
+    let few = ["r1", "r2"].map(|rack| (rack, "remote_ios = 2\nstations = 4"));
+    let placed = |document: &Value, role: &str| -> String {
+        let roles = document["result"]["placed"].as_array().expect("a list");
+        let found = roles.iter().find(|it| it["role"] == role).expect(role);
+        found["rack"].as_str().expect("a rack").to_owned()
+    };
+    for machines in [&apart[..], &shared, &few] {
+        let document = understudy(&["allocate", &plant_of(machines), "--json"]).json();
+        let is_possible = machines.len() > few.len();
+        assert_eq!(document["status"], i32::from(!is_possible), "{document:#}");
+        for name in ["robot", "press"] {
+            let first = placed(&document, &format!("cell/{name}-io"));
+            let twin = placed(&document, &format!("cell/{name}-io-2"));
+            assert_ne!(first, twin, "{document:#}");
+            for station in [name, "understudy"].map(|it| format!("cell/{it}")) {
+                let station = placed(&document, &station);
+                assert!(!is_possible || station != first && station != twin, "{document:#}");
+            }
+        }
+    }
+    // All in one rack: each pair is named once.
+    let document = understudy(&["allocate", &plant_of(&[("r1", room), ("r1", room)]), "--json"]);
+    let document = document.json();
+    let failures = document["failures"].as_array().expect("a list");
+    let of_pair = failures.iter().filter(|it| {
+        let message = it["message"].as_str().unwrap_or_default();
+        message.starts_with("the remote I/Os of `cell/robot`: cell/robot-io and cell/robot-io-2")
+            && message.ends_with("2 members must be apart, and there are 1 such domains")
+    });
+    assert_eq!(of_pair.count(), 1, "{failures:#?}");
+    // Without room for remote I/Os they are not placed, and that is said.
+    let shown = understudy(&["allocate", &plant_of(&apart[..4])]).shown();
+    assert!(shown.contains("are not placed: no [[machine]] has `remote_ios`"), "{shown}");
+}

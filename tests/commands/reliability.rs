@@ -92,20 +92,45 @@ fn shared_spares_are_compared_with_pairs() {
 #[test]
 fn the_tables_of_a_whole_cell_are_those_of_the_page() {
     let page = include_str!("../../docs/how-to/no-single-point.md");
-    for command in ["understudy allocate ", "understudy reliability "] {
-        let (_, after) = page.split_once(&format!("```sh\n{command}")).expect(command);
+    let mut found = 0;
+    for after in page.split("```sh\nunderstudy ").skip(1) {
         let (arguments, after) = after.split_once('\n').expect("a line");
         let (_, table) = after.split_once("```text\n").expect("a table");
         let (table, _) = table.split_once("```").expect("its end");
-        let name = command.split_whitespace().nth(1).expect("a command");
-        let arguments: Vec<&str> = [name].into_iter().chain(arguments.split(' ')).collect();
-        let found = understudy(&arguments);
-        assert_eq!(found.status, 0, "{}", found.errors);
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let answer = understudy(&arguments);
+        assert_eq!(answer.status, 0, "{}", answer.errors);
         assert!(table.lines().count() > 3, "{table}");
         for line in table.lines() {
-            assert!(found.output.lines().any(|it| it == line), "{line}\n{}", found.output);
+            assert!(answer.output.lines().any(|it| it == line), "{line}\n{}", answer.output);
         }
+        found += 1;
     }
+    assert_eq!(found, 3);
+}
+
+/// The wiring of a cluster file decides whether field devices are single points.
+#[test]
+fn field_devices_follow_the_wiring() {
+    let times = ["--remote-io", "20000h,24h", "--field-device", "300000h,24h", "--json"];
+    let of_file = |file: &str| {
+        let file = format!("examples/twin-remote-io/{file}.toml");
+        reliability(&[&[file.as_str()], &RATES[..], &times[..]].concat()).json()["result"].clone()
+    };
+    let by_hand = |parallel: &str| {
+        let counts = ["--controllers", "2", "--twins", "2", "--parallel", parallel];
+        reliability(&[&counts[..], &RATES[..], &times[..]].concat()).json()["result"].clone()
+    };
+    let (exclusive, parallel) = (of_file("cluster"), of_file("parallel"));
+    assert_eq!(
+        (&exclusive["cells"][0], &parallel["cells"][0]),
+        (&by_hand("0")["cells"][0], &by_hand("2")["cells"][0])
+    );
+    assert_eq!(exclusive["single_points"][0]["part"], "field device");
+    assert_eq!(parallel["single_points"], serde_json::json!([]));
+    assert_eq!((&exclusive["boxes"], &parallel["boxes"]), (&Value::from(9), &Value::from(11)));
+    let mean = |of: &Value| of["mttf_cluster_hours"].as_f64().expect("a mean");
+    assert!(mean(&exclusive) < 150_000.0 && mean(&parallel) > 5.0 * mean(&exclusive));
 }
 
 /// A cluster file says how many remote I/Os, twins and networks there are.

@@ -19,7 +19,7 @@ struct Row {
     mttf_hours: f64,
 }
 
-/// Mean time to failure of stations that fail after `stations_hours`, in series with remote I/Os and networks. All of them fail rarely compared with their
+/// Mean time to failure of stations that fail after `stations_hours`, in series with remote I/Os, field devices and networks. All of them fail rarely compared with their
 /// repair, so the times to failure are exponential.
 fn in_series(stations_hours: f64, options: &Options) -> Result<f64, Vec<ReliabilityError>> {
     match options.parts_chain()? {
@@ -51,7 +51,8 @@ pub(super) fn compared(
         return Err(refused(&[wrong]));
     }
     let (wake, coverage): (Option<Hours>, _) = (wake, coverage.unwrap_or(Probability::ONE));
-    let stations = Options { remote_ios: None, networks: None, ..options.clone() };
+    let stations =
+        Options { remote_ios: None, field_devices: None, networks: None, ..options.clone() };
     let pairs = stations.system().and_then(|system| system.copies_chain(2));
     let pairs = pairs.and_then(|chain| chain.mttf().map_err(|error| vec![error]));
     let pairs = pairs.and_then(|hours| in_series(hours, options));

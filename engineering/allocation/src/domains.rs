@@ -1,4 +1,4 @@
-//! Placement of stations, understudies and spares on the machines of a plant, by failure domain.
+//! Placement of stations, understudies, spares and remote I/Os on the machines of a plant, by failure domain.
 //!
 //! ```text
 //!   roles of line-1:  robot      press      understudy   spare-1 ─┐
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Invariant: in a placement without conflicts no machine, rack, feeder or switch has two roles of one group, so its failure takes one of them
-//! at most, which the understudy masks. A domain that no machine names does not count.
+//! at most, which the understudy masks. A domain that no machine names does not count. A remote I/O and its twin are a group too.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -49,8 +49,10 @@ pub struct Machine {
     pub name: String,
     /// Its rack, feeder and switch, where the plant names them.
     pub domains: BTreeMap<Domain, String>,
-    /// Roles that it executes, at most.
+    /// Stations and spares that it executes, at most.
     pub roles: u32,
+    /// Remote I/Os that it executes, at most.
+    pub remote_ios: u32,
     /// Operations in a second that it executes.
     pub capacity: u64,
 }
@@ -65,15 +67,17 @@ impl Machine {
     }
 }
 
-/// What is placed on one machine: a station or an understudy of a group, or a spare.
+/// What is placed on one machine: a station or an understudy of a group, a spare, or a remote I/O.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlantRole {
     /// Its name.
     pub name: String,
-    /// The groups that lose it with its machine, ascending: several for a spare.
+    /// The groups that lose it with its machine, ascending: several for a spare. No domain should take two roles of one group.
     pub groups: Vec<usize>,
     /// Operations in a second that it needs.
     pub load: u64,
+    /// Whether it is a remote I/O, which is at the plant.
+    pub is_remote_io: bool,
 }
 
 /// Roles of one group in one domain.
@@ -107,7 +111,7 @@ pub struct Shortage {
     pub group: usize,
     /// Kind of the domain.
     pub kind: Domain,
-    /// Roles of the group, spares included.
+    /// Roles of the group, with its spares.
     pub roles: usize,
     /// Domains of this kind.
     pub domains: usize,
@@ -223,17 +227,35 @@ impl<'a> Plant<'a> {
 /// What is placed so far.
 struct Used {
     at: Vec<Option<usize>>,
-    /// By machine: roles and operations that it still takes.
-    room: Vec<(u32, u64)>,
+    /// By machine: what it still takes.
+    room: Vec<Room>,
     /// By group and domain: its roles there.
     taken: Vec<Vec<u32>>,
     /// By domain: all roles there.
     crowd: Vec<u32>,
 }
 
+/// What a machine takes: stations and spares, remote I/Os, and operations in a second.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    stations: u32,
+    remote_ios: u32,
+    capacity: u64,
+}
+
+impl Room {
+    fn of(&mut self, role: &PlantRole) -> &mut u32 {
+        if role.is_remote_io { &mut self.remote_ios } else { &mut self.stations }
+    }
+}
+
 impl Used {
     fn new(plant: &Plant<'_>) -> Self {
-        let room = plant.machines.iter().map(|machine| (machine.roles, machine.capacity));
+        let room = plant.machines.iter().map(|machine| Room {
+            stations: machine.roles,
+            remote_ios: machine.remote_ios,
+            capacity: machine.capacity,
+        });
         Self {
             at: vec![None; plant.roles.len()],
             room: room.collect(),
@@ -243,8 +265,8 @@ impl Used {
     }
 
     fn has_room(&self, plant: &Plant<'_>, role: usize, machine: usize) -> bool {
-        let (roles, capacity) = self.room[machine];
-        roles > 0 && capacity >= plant.roles[role].load
+        let (mut room, role) = (self.room[machine], &plant.roles[role]);
+        *room.of(role) > 0 && room.capacity >= role.load
     }
 
     /// Domains of the machine that have a role of a group of this role.
@@ -266,8 +288,8 @@ impl Used {
 
     fn put(&mut self, plant: &Plant<'_>, role: usize, machine: usize) {
         self.at[role] = Some(machine);
-        self.room[machine].0 -= 1;
-        self.room[machine].1 -= plant.roles[role].load;
+        *self.room[machine].of(&plant.roles[role]) -= 1;
+        self.room[machine].capacity -= plant.roles[role].load;
         for (_, domain) in &plant.domains[machine] {
             self.crowd[*domain] += 1;
             for group in &plant.roles[role].groups {
@@ -278,8 +300,8 @@ impl Used {
 
     fn take_back(&mut self, plant: &Plant<'_>, role: usize, machine: usize) {
         self.at[role] = None;
-        self.room[machine].0 += 1;
-        self.room[machine].1 += plant.roles[role].load;
+        *self.room[machine].of(&plant.roles[role]) += 1;
+        self.room[machine].capacity += plant.roles[role].load;
         for (_, domain) in &plant.domains[machine] {
             self.crowd[*domain] -= 1;
             for group in &plant.roles[role].groups {

@@ -1,23 +1,26 @@
-//! `understudy-bench twins`: a cell of two networks, an understudy and twins on Modbus devices that record their writers. Processes are killed and
+//! `understudy-bench twins`: a cell of two networks, an understudy and twins on Modbus devices that record each write. Processes are killed and
 //! suspended, and networks cut, at random phases of the cycle, one or two at once.
 
 mod device;
+mod judge;
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use understudy::{Answer, ClusterRun, Console, RunArguments, Status};
 use understudy_cluster::Cluster;
+use understudy_journal::{Happening, Members, RunEvent, records_of};
+use understudy_remote_io::{Event, SWITCHOVER};
 use understudy_scenarios::{Action, Fault, Scenario};
-use understudy_wire::{Member, ProgramId, StationId, Via};
+use understudy_wire::{Image, Member, ProgramId, SignalPlace, StationId, Via};
 
 use device::{Device, Recorded};
+use judge::{Outputs, Rule, judge, longest_gap};
 
 /// Kill and suspend members of a cell with twins and cut its networks, in front of devices that record who writes them
 #[derive(Debug, Args)]
@@ -28,6 +31,9 @@ pub(crate) struct Arguments {
     /// `take_over_after` of the twins
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
     take_over_after: u32,
+    /// How the two remote I/Os of a program are connected to the plant
+    #[arg(long, value_enum, default_value = "exclusive")]
+    wiring: Wiring,
     /// Folder for the files of the cell
     #[arg(long, value_name = "DIR", default_value = "twins-bench")]
     folder: PathBuf,
@@ -37,6 +43,23 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     run: RunArguments,
 }
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Wiring {
+    /// Both reach one device, and the author writes to it
+    Exclusive,
+    /// Each writes to a device of its own
+    Parallel,
+}
+
+/// Outputs of a program, in the order of their coils.
+const OUTPUTS: [&str; 5] = ["move_right", "move_left", "move_down", "move_up", "grip"];
+
+/// Periods for which outputs may be under way, and be recorded later than driven.
+const UNDER_WAY: u32 = 2;
+
+/// Periods before the end of a process whose records may be missing.
+const UNRECORDED: u32 = 20;
 
 /// Cycles from the end of one fault to the next: enough for a new connection to the device and a synchronised station.
 const RECOVERY_CYCLES: f64 = 80.0;
@@ -156,21 +179,35 @@ fn scenario(cluster: &Cluster, of: Target, count: u32, random: &mut Pcg64Mcg) ->
     }
 }
 
+/// Devices of each program: of its remote I/O, and of the twin, which uses it with `parallel` only.
+type Devices = [[Device; 2]; 2];
+
 /// The cluster file, with the devices of its programs.
-fn files(folder: &Path, devices: &[Device], take_over_after: u32) -> std::io::Result<PathBuf> {
+fn files(
+    folder: &Path,
+    devices: &Devices,
+    take_over_after: u32,
+    wiring: Wiring,
+) -> std::io::Result<PathBuf> {
     let mut text = "[cluster]\nname = \"twins\"\nperiod = \"10ms\"\nnetworks = 2\n".to_owned();
     for name in ["left", "right"] {
         let _ = writeln!(text, "[[controller]]\nname = \"{name}\"\nladder = \"robot.ladder\"");
     }
     text.push_str("[[understudy]]\nname = \"understudy\"\n");
-    for (name, device) in ["left", "right"].into_iter().zip(devices) {
+    let coils = OUTPUTS.iter().enumerate().map(|(coil, name)| format!("{name} = \"coil:{coil}\""));
+    let coils = coils.collect::<Vec<_>>().join(", ");
+    for (name, [device, of_twin]) in ["left", "right"].into_iter().zip(devices) {
+        let wiring = match wiring {
+            Wiring::Exclusive => "wiring = \"exclusive\"".to_owned(),
+            Wiring::Parallel => format!("wiring = \"parallel\", modbus = \"{}\"", of_twin.address),
+        };
         let _ = write!(
             text,
             "[[remote_io]]\nname = \"{name}-io\"\ncontroller = \"{name}\"\n\
-             twin = {{ name = \"{name}-io-2\", wiring = \"exclusive\", take_over_after = {take_over_after} }}\n\
+             twin = {{ name = \"{name}-io-2\", {wiring}, take_over_after = {take_over_after} }}\n\
              [remote_io.field]\nmodbus = \"{}\"\n\
              inputs = {{ part_present = \"discrete:0\", arm_left = \"discrete:1\", arm_right = \"discrete:2\", arm_up = \"discrete:3\", arm_down = \"discrete:4\", stop = \"discrete:5\" }}\n\
-             outputs = {{ move_right = \"coil:0\", move_left = \"coil:1\", move_down = \"coil:2\", move_up = \"coil:3\", grip = \"coil:4\" }}\n",
+             outputs = {{ {coils} }}\n",
             device.address
         );
     }
@@ -201,16 +238,78 @@ struct Row {
     writes: u64,
     /// Connections that have written.
     writers: u64,
-    /// Writes of a connection after a later one had written.
+    /// Writes to a device by a connection after a later one had written.
     by_two: u64,
-    /// Longest time between two writes of a device, in periods.
+    /// Writes of outputs that no author has driven lately.
+    unproved: u64,
+    /// The same around the end of a process, whose last records are lost.
+    unrecorded: u64,
+    /// Reports that the input modules of a program differ, which they do not.
+    input_alarms: u64,
+    /// Longest time without a write to the devices of a program, in periods.
     longest_gap_cycles: f64,
+}
+
+/// What the members of a run have recorded of the outputs of one program.
+#[derive(Debug, Default)]
+struct OfProgram {
+    /// What its authors have driven.
+    driven: Vec<Outputs>,
+    input_alarms: u64,
+}
+
+/// What the members of a run have recorded: of each program, and when processes have ended.
+fn recorded(directory: &Path, cluster: &Cluster) -> Result<(Vec<OfProgram>, Vec<u64>), Answer> {
+    let failed = |error: String| Answer::failed(Status::Failed, "U0602", error);
+    let members = Members::of(cluster);
+    let coils = |program: ProgramId, image: &Image| -> u64 {
+        let on = members.outputs(program).filter(|signal| {
+            matches!(signal.place, SignalPlace::Output(place) if image.get(usize::from(place)))
+        });
+        on.filter_map(|signal| OUTPUTS.iter().position(|name| *name == signal.name))
+            .map(|coil| 1 << coil)
+            .sum()
+    };
+    let mut programs: Vec<OfProgram> =
+        cluster.controllers().iter().map(|_| OfProgram::default()).collect();
+    let mut ends = Vec::new();
+    let journal = records_of(&directory.join("journal.jsonl"));
+    for record in journal.map_err(|error| failed(error.to_string()))? {
+        let record = record.map_err(|error| failed(error.to_string()))?;
+        let program = record.member.and_then(Member::sampled_program);
+        match (&record.event, program) {
+            (Happening::Run(RunEvent::Fault { action: Action::Crash, .. }), _) => {
+                ends.push(record.at_ns);
+            }
+            (Happening::RemoteIo(event), Some(program)) => {
+                let of_program = &mut programs[program.index()];
+                if let Some(image) = event.driven() {
+                    let coils = coils(program, image);
+                    of_program.driven.push(Outputs { at_ns: record.at_ns, coils });
+                }
+                let is_alarm =
+                    matches!(event, Event::InputsDiffer { .. } | Event::InputExcluded { .. });
+                of_program.input_alarms += u64::from(is_alarm);
+            }
+            _ => {}
+        }
+    }
+    for program in &mut programs {
+        program.driven.sort_by_key(|outputs| outputs.at_ns);
+    }
+    Ok((programs, ends))
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let failed = |error: std::io::Error| Answer::failed(Status::Failed, "U0602", error);
-    let devices = [Device::start().map_err(failed)?, Device::start().map_err(failed)?];
-    let file = files(&arguments.folder, &devices, arguments.take_over_after).map_err(failed)?;
+    let pair = || -> std::io::Result<[Device; 2]> {
+        let first = Device::start()?;
+        let twin = first.beside()?;
+        Ok([first, twin])
+    };
+    let devices = [pair().map_err(failed)?, pair().map_err(failed)?];
+    let file = files(&arguments.folder, &devices, arguments.take_over_after, arguments.wiring)
+        .map_err(failed)?;
     let mut random = Pcg64Mcg::seed_from_u64(arguments.seed);
     let mut rows = Vec::new();
     for of in Target::ALL {
@@ -226,7 +325,7 @@ fn row(
     of: Target,
     count: u32,
     file: &Path,
-    devices: &[Device; 2],
+    devices: &Devices,
     arguments: &Arguments,
     random: &mut Pcg64Mcg,
     console: &mut Console,
@@ -234,16 +333,29 @@ fn row(
     let cell = ClusterRun::of_file(file.to_owned(), &arguments.run)?;
     let scenario = scenario(&cell.cluster, of, count, random).shortened(arguments.run.cycles);
     console.note(&scenario.title);
-    for device in devices {
+    for device in devices.as_flattened() {
         device.take();
     }
     let (summary, judged) = cell.judged(&scenario, &arguments.run, console)?;
     if let Some(failure) = judged.failure {
         return Err(Answer::failed(Status::Failed, failure.code(), &failure));
     }
-    let recorded = devices.each_ref().map(Device::take);
-    let sum = |of: fn(&Recorded) -> u64| recorded.iter().map(of).sum();
-    let longest = recorded.iter().map(|it| it.longest_gap).max().unwrap_or(Duration::ZERO);
+    let taken = devices.each_ref().map(|pair| pair.each_ref().map(Device::take));
+    let sum = |of: fn(&Recorded) -> u64| taken.as_flattened().iter().map(of).sum();
+    let period = cell.cluster.agreement().schedule.period();
+    let ns = |periods: u32| u64::try_from((period * periods).as_nanos()).unwrap_or(u64::MAX);
+    let rule = Rule {
+        oldest: ns(arguments.take_over_after + SWITCHOVER + 1 + UNDER_WAY),
+        recorded_after: ns(UNDER_WAY),
+        unrecorded: ns(UNRECORDED),
+    };
+    let (programs, ends) = recorded(cell.path(), &cell.cluster)?;
+    let pairs = programs.iter().zip(&taken);
+    let devices = pairs.flat_map(|(program, pair)| pair.iter().map(move |it| (program, it)));
+    let found = devices.map(|(program, it)| judge(&it.writes, &program.driven, &ends, rule));
+    let found: Vec<judge::Found> = found.collect();
+    let gaps = taken.iter().map(|[first, twin]| longest_gap(&[&first.writes, &twin.writes]));
+    let longest = gaps.max().unwrap_or(0);
     let total = summary.total();
     Ok(Row {
         fault: of.words(),
@@ -259,17 +371,19 @@ fn row(
         held: total.held,
         fail_safe: total.fail_safe,
         by_stall: total.held_by_stall + total.fail_safe_by_stall,
-        writes: sum(|it| it.writes),
+        writes: sum(|it| it.writes.len() as u64),
         writers: sum(|it| it.writers),
         by_two: sum(|it| it.by_two),
-        longest_gap_cycles: longest.as_secs_f64()
-            / cell.cluster.agreement().schedule.period().as_secs_f64(),
+        unproved: found.iter().map(|it| it.unproved).sum(),
+        unrecorded: found.iter().map(|it| it.unrecorded).sum(),
+        input_alarms: programs.iter().map(|it| it.input_alarms).sum(),
+        longest_gap_cycles: longest as f64 / period.as_nanos() as f64,
     })
 }
 
 fn answer(rows: &[Row]) -> Answer {
     let mut text = format!(
-        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>12}\n",
+        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12}\n",
         "fault",
         "count",
         "wrong",
@@ -279,12 +393,15 @@ fn answer(rows: &[Row]) -> Answer {
         "writes",
         "writers",
         "two writers",
+        "unproved",
+        "unrecorded",
+        "input alarms",
         "longest gap"
     );
     for row in rows {
         let _ = writeln!(
             text,
-            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>12.1}",
+            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12.1}",
             row.fault,
             row.count,
             row.wrong,
@@ -294,14 +411,19 @@ fn answer(rows: &[Row]) -> Answer {
             row.writes,
             row.writers,
             row.by_two,
+            row.unproved,
+            row.unrecorded,
+            row.input_alarms,
             row.longest_gap_cycles
         );
         for violation in &row.violations {
             let _ = writeln!(text, "    {violation}");
         }
     }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; the longest gap is that between two writes of a device, in periods\n");
-    let passed = rows.iter().all(|row| row.wrong == 0 && row.by_two == 0);
+    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nthe longest gap is that between two writes to the devices of a program, in periods\n");
+    let is_right =
+        |row: &Row| (row.wrong, row.by_two, row.unproved, row.input_alarms) == (0, 0, 0, 0);
+    let passed = rows.iter().all(is_right);
     let status = if passed { Status::Done } else { Status::Failed };
     Answer::done(text, rows).with_status(status)
 }

@@ -100,6 +100,18 @@ pub enum Action {
         /// Input, by its first bit in u(i), counted from 0.
         input: u16,
     },
+    /// An input module of a remote I/O shows a fixed value of an input from now on, whatever the remote I/O does.
+    StickInput {
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+        /// What it shows.
+        value: bool,
+    },
+    /// That input module shows the true value again.
+    FreeInput {
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+    },
     /// Its frames reach one other member no more. A full cut is one each way; a partition is one for each pair.
     Cut {
         /// Who hears it no more.
@@ -213,6 +225,8 @@ impl Action {
             Self::Choose { .. } => "accept-state",
             Self::Write { .. } => "write",
             Self::Set { .. } => "set",
+            Self::StickInput { .. } => "stick-input",
+            Self::FreeInput { .. } => "free-input",
             Self::Cut { .. } => "cut",
             Self::Heal { .. } => "heal",
             Self::Unplug { .. } => "unplug",

@@ -7,6 +7,7 @@
 mod disk;
 mod fault;
 mod field;
+mod input_reports;
 mod links;
 mod modules;
 mod network;

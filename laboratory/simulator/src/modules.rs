@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use understudy_remote_io::{PairSettings, Wiring};
+use understudy_remote_io::{Settings, Wiring};
 use understudy_wire::{Image, Member, Time};
 
 /// Periods that outputs may be under way from the author to its follower, at most.
@@ -28,8 +28,10 @@ pub(crate) struct Modules {
 }
 
 impl Modules {
-    pub(crate) fn new(pair: Option<PairSettings>, period: Duration) -> Self {
-        let parallel = pair.filter(|pair| matches!(pair.wiring, Wiring::Parallel { .. }));
+    /// Of the program of a remote I/O.
+    pub(crate) fn of(settings: &Settings) -> Self {
+        let period = settings.agreement.schedule.period();
+        let parallel = settings.pair.filter(|pair| matches!(pair.wiring, Wiring::Parallel { .. }));
         Self {
             period,
             lasting: parallel.map_or(0, |pair| pair.lasting()),

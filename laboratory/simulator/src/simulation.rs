@@ -25,6 +25,7 @@ use understudy_wire::{
 use crate::disk::Disks;
 use crate::fault::Fault;
 use crate::field::Plants;
+use crate::input_reports::InputReports;
 use crate::links::{Links, Metered};
 use crate::modules::Modules;
 use crate::network::{Disturbance, Network};
@@ -88,6 +89,8 @@ pub struct Simulation {
     plants: Plants,
     /// For each program, the modules between its remote I/Os and its plant.
     modules: Vec<Modules>,
+    /// Whether it is reported that these show different values.
+    input_reports: Vec<Option<InputReports>>,
     disks: Disks,
     referees: Vec<Referee>,
     signals: SignalReferee,
@@ -171,11 +174,8 @@ impl Simulation {
             remote_ios,
             twins,
             plants: Plants::new(&parts),
-            modules: parts
-                .remote_ios
-                .iter()
-                .map(|settings| Modules::new(settings.pair, settings.agreement.schedule.period()))
-                .collect(),
+            modules: parts.remote_ios.iter().map(Modules::of).collect(),
+            input_reports: parts.remote_ios.iter().map(InputReports::of).collect(),
             disks,
             referees,
             signals: SignalReferee::new(&parts.remote_ios),

@@ -32,7 +32,7 @@ pub struct Continuation {
     pub numbering: Numbering,
     /// The stations that have taken a turn: they have reported one, or a remote I/O has received one.
     pub received: StationSet,
-    /// By program, its remote I/O; nothing before its first deadline.
+    /// By program, its remote I/Os; nothing before their first deadline.
     pub programs: Vec<Option<ProgramSoFar>>,
 }
 
@@ -110,7 +110,7 @@ impl Followed {
                     sampled,
                     ..
                 }),
-                Some(Member::RemoteIo(program)),
+                Some(Member::RemoteIo(program) | Member::Twin(program)),
             ) => {
                 let idle = *missing == Some(Missing::NoCycle);
                 let cycle = self.cycles.deadline(program, *moment, idle);

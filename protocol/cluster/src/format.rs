@@ -366,14 +366,15 @@ pub(crate) static SPARE: Section = Section {
 pub(crate) static MACHINE: Section = Section {
     name: "machine",
     repeated: true,
-    meaning: "a machine on which `understudy allocate` places stations, understudies and spares",
+    meaning: "a machine on which `understudy allocate` places stations, understudies, spares and remote I/Os",
     keys: keys! {
         required name: Kind::Name, "names the machine";
         key rack: Kind::Text, "its rack";
         key feeder: Kind::Text, "the feeder of its power";
         key switch: Kind::Text, "the switch that it is connected to";
         key stations: count(1, u32::MAX, 1), "stations, understudies and spares that it executes at most";
-        key capacity: count(1, u32::MAX, u32::MAX), "operations in a second that it executes for all of them";
+        key remote_ios: count(0, u32::MAX, 0), "remote I/Os that it executes at most; without a machine that has it, remote I/Os are not placed";
+        key capacity: count(1, u32::MAX, u32::MAX), "operations in a second that it executes for all stations and spares";
     },
 };
 

@@ -3,6 +3,7 @@
 
 mod cells;
 mod chains;
+mod enumerated;
 mod fits;
 mod intervals;
 mod outlooks;

@@ -107,19 +107,31 @@ impl Reader<'_> {
         let any = |_: Member| true;
         let in_cluster = |member: Member| !matches!(member, Member::Plant(_));
         let of_remote_io = |member: Member| matches!(member, Member::RemoteIo(_));
+        let of_either = |member: Member| member.sampled_program().is_some();
         let of_station = |member: Member| matches!(member, Member::Station(_));
         let (fits, wanted): (fn(Member) -> bool, &str) = match word {
             "crash" | "restart" | "stop" | "continue" => (any, ""),
-            "release" | "cold-start" | "accept-state" | "write" | "set" => {
-                (of_remote_io, "names a remote I/O")
+            // The one that asks, or has excluded something, may be a twin.
+            "release" | "cold-start" | "accept-state" | "stick-input" | "free-input" => {
+                (of_either, "names a remote I/O")
             }
+            "write" | "set" => (of_remote_io, "names the first remote I/O of a program"),
             "flip-state" | "flip-word" => (of_station, "names a controller or an understudy"),
             _ => (in_cluster, "names a station or a remote I/O, and no plant"),
         };
         if let Some(member) = member.filter(|&member| !fits(member)) {
             let name = station.value;
             let message = match (word, member) {
-                ("release" | "cold-start" | "accept-state" | "write" | "set", _) => {
+                ("write" | "set", Member::Twin(_)) => {
+                    format!(
+                        "`{name}` is the twin of a remote I/O, and `{word}` concerns the first one"
+                    )
+                }
+                (
+                    "release" | "cold-start" | "accept-state" | "stick-input" | "free-input"
+                    | "write" | "set",
+                    _,
+                ) => {
                     format!("`{name}` is not a remote I/O, and `{word}` concerns one")
                 }
                 _ => format!("`{name}` cannot be the target of `{word}`"),
@@ -144,7 +156,7 @@ impl Reader<'_> {
             "stop" => one(Action::Stop),
             "continue" => one(Action::Continue),
             "release" if fields.has("input") => {
-                one(Action::Unset { input: self.input(fields, member)?.place.first_bit() })
+                one(Action::Unset { input: self.input(fields, member)?.value.place.first_bit() })
             }
             "release" => one(Action::Release),
             "cold-start" => one(Action::Choose { choice: StateChoice::Cold }),
@@ -154,7 +166,7 @@ impl Reader<'_> {
                 fields.require(&["value"], &mut self.diagnostics);
                 let value = fields.get("value");
                 let value = value.and_then(|value| value.constant(&mut self.diagnostics));
-                let signal = self.input(fields, member)?;
+                let Placed { value: signal, .. } = self.input(fields, member)?;
                 let Placed { value, span } = value?;
                 match stored_value(&value, signal.of) {
                     Ok(stored) => one(Action::Set {
@@ -169,6 +181,13 @@ impl Reader<'_> {
                     }
                 }
             }
+            "stick-input" => {
+                fields.require(&["value"], &mut self.diagnostics);
+                let value = fields.flag("value", &mut self.diagnostics);
+                let input = self.module_input(fields, member)?;
+                one(Action::StickInput { input, value: value? })
+            }
+            "free-input" => one(Action::FreeInput { input: self.module_input(fields, member)? }),
             "slow" => one(Action::Slow { by: self.slowness(fields)? }),
             "cut" => self.cut(fields, member, |to| Action::Cut { to }),
             "heal" => self.cut(fields, member, |to| Action::Heal { to }),
@@ -205,21 +224,31 @@ impl Reader<'_> {
         &mut self,
         fields: &mut Fields<'_, '_>,
         member: Option<Member>,
-    ) -> Option<&NamedSignal> {
+    ) -> Option<Placed<&NamedSignal>> {
         fields.require(&["input"], &mut self.diagnostics);
         let name = fields.text("input", &mut self.diagnostics)?;
-        let Some(Member::RemoteIo(program)) = member else {
-            return None;
-        };
+        let program = member.and_then(Member::sampled_program)?;
         let inputs = || self.members.into_iter().flat_map(|it| it.inputs(program));
         let found = inputs().find(|signal| signal.name == name.value);
         if found.is_none() {
             let help = suggestion(name.value, inputs().map(|signal| signal.name.as_str()));
             let message = format!("the program has no input `{}`", name.value);
-            let error = Diagnostic::error("U0309", message, name.span);
+            let error = Diagnostic::error("U0309", message, name.span.clone());
             self.diagnostics.push(error.with_help(help));
         }
-        found
+        Some(Placed { value: found?, span: name.span })
+    }
+
+    /// The input of a module that is stuck: one bit.
+    fn module_input(&mut self, fields: &mut Fields<'_, '_>, member: Option<Member>) -> Option<u16> {
+        let Placed { value: signal, span } = self.input(fields, member)?;
+        let (place, of, name) = (signal.place.first_bit(), signal.of, signal.name.clone());
+        if of.bits() == 1 {
+            return Some(place);
+        }
+        let message = format!("`{name}` is {of}: an input module is stuck at a BOOL only");
+        self.diagnostics.push(Diagnostic::error("U0304", message, span));
+        None
     }
 
     /// An input that operators write, and its value.

@@ -14,12 +14,13 @@ fn machine(name: &str, rack: &str, feeder: &str) -> Machine {
         name: name.to_owned(),
         domains: domains.map(|(kind, name)| (kind, name.to_owned())).collect(),
         roles: 1,
+        remote_ios: 0,
         capacity: 100,
     }
 }
 
 fn role(name: &str, groups: &[usize]) -> PlantRole {
-    PlantRole { name: name.to_owned(), groups: groups.to_vec(), load: 10 }
+    PlantRole { name: name.to_owned(), groups: groups.to_vec(), load: 10, is_remote_io: false }
 }
 
 /// Whether a placement keeps the roles of each group apart, by the definition.
@@ -31,13 +32,15 @@ fn is_apart(machines: &[Machine], roles: &[PlantRole], at: &[usize]) -> bool {
         let same = |kind| left.domain(kind).is_some() && left.domain(kind) == right.domain(kind);
         together && Domain::ALL.into_iter().any(same)
     };
-    let mut sums: BTreeMap<usize, (u32, u64)> = BTreeMap::new();
+    let mut sums: BTreeMap<usize, (u32, u32, u64)> = BTreeMap::new();
     for (role, machine) in at.iter().enumerate() {
         let sum = sums.entry(*machine).or_default();
-        *sum = (sum.0 + 1, sum.1 + roles[role].load);
+        let remote_ios = u32::from(roles[role].is_remote_io);
+        *sum = (sum.0 + 1 - remote_ios, sum.1 + remote_ios, sum.2 + roles[role].load);
     }
-    let holds = |(machine, (count, load)): (&usize, &(u32, u64))| {
-        *count <= machines[*machine].roles && *load <= machines[*machine].capacity
+    let holds = |(machine, (stations, remote_ios, load)): (&usize, &(u32, u32, u64))| {
+        let machine = &machines[*machine];
+        *stations <= machine.roles && *remote_ios <= machine.remote_ios && *load <= machine.capacity
     };
     !pairs.into_iter().any(shares) && sums.iter().all(holds)
 }
@@ -56,9 +59,10 @@ fn exists(machines: &[Machine], roles: &[PlantRole], at: &mut Vec<usize>) -> boo
 }
 
 fn machines() -> impl Strategy<Value = Vec<Machine>> {
-    let one = (0..4_u8, 0..4_u8, 1..3_u32, 1..3_u64).prop_map(|(rack, feeder, roles, tens)| {
+    let one = (0..4_u8, 0..4_u8, 1..3_u32, 0..2_u32, 1..3_u64);
+    let one = one.prop_map(|(rack, feeder, roles, remote_ios, tens)| {
         let one = machine("", &format!("rack-{rack}"), &format!("feeder-{feeder}"));
-        Machine { roles, capacity: 10 * tens, ..one }
+        Machine { roles, remote_ios, capacity: 10 * tens, ..one }
     });
     prop::collection::vec(one, 3..6).prop_map(|mut machines| {
         for (number, machine) in machines.iter_mut().enumerate() {
@@ -70,7 +74,8 @@ fn machines() -> impl Strategy<Value = Vec<Machine>> {
 
 fn roles() -> impl Strategy<Value = Vec<PlantRole>> {
     let groups = prop::sample::select(vec![vec![0], vec![1], vec![0, 1]]);
-    let one = groups.prop_map(|groups| role("any", &groups));
+    let one = (groups, prop::bool::weighted(0.3))
+        .prop_map(|(groups, is_remote_io)| PlantRole { is_remote_io, ..role("any", &groups) });
     prop::collection::vec(one, 2..6)
 }
 

@@ -1,4 +1,4 @@
-//! A Modbus TCP device that records who writes it.
+//! A Modbus TCP device that records each write, and who writes it.
 //!
 //! A writer is a connection. Two writers at one time are found by their order: once a connection has written, an earlier one must not write any more.
 
@@ -7,6 +7,10 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use understudy_bus::Clock;
+
+use super::judge::Outputs;
+
 /// Coils and discrete inputs.
 const POINTS: usize = 64;
 
@@ -14,16 +18,14 @@ const POINTS: usize = 64;
 const INPUTS_CHANGE: Duration = Duration::from_millis(300);
 
 /// What was recorded.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Recorded {
-    /// Writes.
-    pub(super) writes: u64,
+    /// Its coils after each write.
+    pub(super) writes: Vec<Outputs>,
     /// Connections that have written.
     pub(super) writers: u64,
     /// Writes of a connection after a later one had written.
     pub(super) by_two: u64,
-    /// Longest time between two writes.
-    pub(super) longest_gap: Duration,
 }
 
 #[derive(Debug)]
@@ -32,14 +34,15 @@ struct State {
     recorded: Recorded,
     /// The newest connection that has written.
     writer: Option<u64>,
-    last: Option<Instant>,
-    began: Instant,
 }
 
 /// The device; it ends with the process.
 #[derive(Debug, Clone)]
 pub(super) struct Device {
     pub(super) address: SocketAddr,
+    /// When its inputs began to change.
+    began: Instant,
+    clock: Clock,
     state: Arc<Mutex<State>>,
 }
 
@@ -49,15 +52,26 @@ impl Device {
     /// # Errors
     /// No port can be opened.
     pub(super) fn start() -> std::io::Result<Self> {
+        Self::since(Instant::now())
+    }
+
+    /// Another device at the same sensors.
+    ///
+    /// # Errors
+    /// No port can be opened.
+    pub(super) fn beside(&self) -> std::io::Result<Self> {
+        Self::since(self.began)
+    }
+
+    fn since(began: Instant) -> std::io::Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
-        let state = State {
-            coils: [false; POINTS],
-            recorded: Recorded::default(),
-            writer: None,
-            last: None,
-            began: Instant::now(),
+        let state = State { coils: [false; POINTS], recorded: Recorded::default(), writer: None };
+        let device = Self {
+            address: listener.local_addr()?,
+            began,
+            clock: Clock::start(),
+            state: Arc::new(Mutex::new(state)),
         };
-        let device = Self { address: listener.local_addr()?, state: Arc::new(Mutex::new(state)) };
         let served = device.clone();
         std::thread::spawn(move || {
             for (connection, stream) in (0..).zip(listener.incoming().flatten()) {
@@ -70,9 +84,7 @@ impl Device {
 
     /// What was recorded since the last call; the connections stay known.
     pub(super) fn take(&self) -> Recorded {
-        let mut state = self.state();
-        state.last = None;
-        std::mem::take(&mut state.recorded)
+        std::mem::take(&mut self.state().recorded)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -114,7 +126,7 @@ impl Device {
         match function {
             1 | 2 => {
                 let state = self.state();
-                let tick = state.began.elapsed().as_millis() / INPUTS_CHANGE.as_millis();
+                let tick = self.began.elapsed().as_millis() / INPUTS_CHANGE.as_millis();
                 let bit = |at: usize| match function {
                     1 => state.coils[at],
                     _ => tick.wrapping_mul(0x9E37_79B9) >> (at + 3) & 1 == 1,
@@ -144,17 +156,16 @@ impl Device {
     fn write(&self, connection: u64, first: usize, values: &[bool]) {
         let mut state = self.state();
         state.coils[first..first + values.len()].copy_from_slice(values);
-        let now = Instant::now();
         if state.writer.is_some_and(|newest| connection < newest) {
             state.recorded.by_two += 1;
         } else if state.writer != Some(connection) {
             state.recorded.writers += 1;
             state.writer = Some(connection);
         }
-        state.recorded.writes += 1;
-        if let Some(last) = state.last.replace(now) {
-            state.recorded.longest_gap = state.recorded.longest_gap.max(now - last);
-        }
+        let on = state.coils.iter().enumerate().filter(|(_, on)| **on);
+        let coils = on.map(|(place, _)| 1 << place).sum();
+        let at_ns = self.clock.host_ns(self.clock.now());
+        state.recorded.writes.push(Outputs { at_ns, coils });
     }
 }
 
@@ -183,7 +194,10 @@ mod tests {
         let mut second = TcpStream::connect(device.address).expect("connected");
         assert_eq!(ask(&mut second, &[5, 0, 2, 0, 0]), [5, 0, 2, 0, 0]);
         assert_eq!(ask(&mut second, &[1, 0, 0, 0, 8]), [1, 1, 0b10000]);
-        assert_eq!((device.take().writers, device.take().by_two), (2, 0));
+        let recorded = device.take();
+        assert_eq!((recorded.writers, recorded.by_two), (2, 0));
+        let coils: Vec<u64> = recorded.writes.iter().map(|write| write.coils).collect();
+        assert_eq!(coils, [0b10100, 0b10000]);
         ask(&mut first, &on);
         assert_eq!(device.take().by_two, 1);
         assert_eq!(ask(&mut first, &[15, 0, 63, 0, 3, 1, 1]), [0x8F, 2], "beyond its coils");

@@ -24,6 +24,9 @@ const MAXIMUM_INJECTIONS: u32 = 6;
 /// Cycles for which a link is broken, at most, where a station crashes after it.
 const LONGEST_OUTAGE: f64 = 10_000.0;
 
+/// Cycles for which an input is stuck, at most: several times those after which it is reported.
+const LONGEST_STUCK: u64 = 600;
+
 /// Restarts of one storm, at most.
 const MAXIMUM_RESTARTS: u64 = 6;
 
@@ -35,6 +38,8 @@ pub(super) struct Target<'a> {
     has_two_networks: bool,
     /// Programs with a second remote I/O.
     twins: ProgramSet,
+    /// Inputs that modules of both remote I/Os read, of one bit.
+    paired: Vec<(ProgramId, u16)>,
 }
 
 impl<'a> Target<'a> {
@@ -44,7 +49,14 @@ impl<'a> Target<'a> {
             let inputs = remote_io.operator_inputs();
             inputs.map(move |declared| (program, declared.input))
         });
+        let programs = (0..).map(ProgramId).zip(cluster.remote_ios());
+        let paired = programs.flat_map(|(program, remote_io)| {
+            let inputs = remote_io.twin.iter().flat_map(|twin| &twin.paired_inputs);
+            let bits = inputs.filter(|input| input.place.of.bits() == 1);
+            bits.map(move |input| (program, input.place.bit))
+        });
         Self {
+            paired: paired.collect(),
             schedule: &cluster.agreement().schedule,
             inputs: inputs.collect(),
             has_two_networks: cluster.has_two_networks(),
@@ -52,12 +64,14 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// The kinds that can be drawn: a cluster without operator inputs has no writes, and one with one network none that may fail.
+    /// The kinds that can be drawn: a cluster without operator inputs has no writes, one with one network none that may fail, and one where each input has
+    /// one module has none that may be stuck.
     pub(super) fn kinds(&self, kinds: &[Kind]) -> Vec<Kind> {
         let kinds = kinds.iter().copied();
         let can_be = |kind: &Kind| match kind {
             Kind::Write => !self.inputs.is_empty(),
             Kind::NetworkFailure => self.has_two_networks,
+            Kind::StuckInput => !self.paired.is_empty(),
             _ => true,
         };
         kinds.filter(can_be).collect()
@@ -76,6 +90,7 @@ pub(super) fn draw(
         schedule: target.schedule,
         inputs: &target.inputs,
         twins: target.twins,
+        paired: &target.paired,
         cycles: cycles.clone(),
     };
     let mut faultload = Faultload::default();
@@ -111,6 +126,7 @@ struct Draw<'a> {
     schedule: &'a Schedule,
     inputs: &'a [(ProgramId, OperatorInput)],
     twins: ProgramSet,
+    paired: &'a [(ProgramId, u16)],
     cycles: Range<u64>,
 }
 
@@ -270,6 +286,17 @@ impl Draw<'_> {
                 };
                 let back = steps(to, Action::Plug { network });
                 steps(from, Action::Unplug { network }).chain(back).collect()
+            }
+            Kind::StuckInput => {
+                let (program, input) = self.one_of(self.paired);
+                let member = self.one_of(&[Member::RemoteIo(program), Member::Twin(program)]);
+                let value = self.random.random_range(0..2) == 1;
+                let to = from + self.random.random_range(1..=LONGEST_STUCK);
+                let at = |at_cycle, action| Fault { at_cycle, phase, member, action };
+                vec![
+                    at(from, Action::StickInput { input, value }),
+                    at(to.min(self.cycles.end - 1), Action::FreeInput { input }),
+                ]
             }
             Kind::CorruptFrames => {
                 let frames = self.random.random_range(1..=8);

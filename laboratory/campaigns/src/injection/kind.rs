@@ -40,6 +40,8 @@ pub enum Kind {
     Isolation,
     /// Of two networks one fails, or the cable of one member to it is pulled, for a while.
     NetworkFailure,
+    /// An input module of one of two remote I/Os shows a fixed value for a while.
+    StuckInput,
     /// Bits of some of its frames flip on their way.
     CorruptFrames,
     /// An old frame of it comes once more.
@@ -66,7 +68,7 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::Write,
         Self::Crash,
         Self::RestartStorm,
@@ -81,6 +83,7 @@ impl Kind {
         Self::LateLink,
         Self::Isolation,
         Self::NetworkFailure,
+        Self::StuckInput,
         Self::CorruptFrames,
         Self::Replay,
         Self::Forgery,
@@ -111,6 +114,7 @@ impl Kind {
             Self::LateLink => "late-link",
             Self::Isolation => "isolation",
             Self::NetworkFailure => "network-failure",
+            Self::StuckInput => "stuck-input",
             Self::CorruptFrames => "corrupt-frames",
             Self::Replay => "replay",
             Self::Forgery => "forgery",
@@ -132,7 +136,7 @@ impl Kind {
                 &[Role::Controller, Role::Understudy]
             }
             Self::Loss | Self::Duplication | Self::Jitter | Self::Corruption => &[Role::Network],
-            Self::Write | Self::WrongProgram => &[Role::RemoteIo],
+            Self::Write | Self::WrongProgram | Self::StuckInput => &[Role::RemoteIo],
             _ => &[Role::Controller, Role::Understudy, Role::RemoteIo],
         }
     }

@@ -87,6 +87,16 @@ pub enum Violation {
         /// What they drive.
         driven: Image,
     },
+    /// The two modules of an input have shown different values for long, and no remote I/O has reported it.
+    #[error(
+        "in cycle {moment} the modules of the input at bit {input} show different values for too long, and it is not reported"
+    )]
+    InputsNotReported {
+        /// The cycle in which it happened.
+        moment: Moment,
+        /// First bit in u(i), counted from 0.
+        input: u16,
+    },
     /// A signal of another program was sampled with a value that the other program did not compute.
     #[error(
         "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"

@@ -11,6 +11,7 @@ use understudy_wire::{
 use super::pairs::twin_of;
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, ChangeStep, Fault};
+use crate::input_reports::InputReports;
 use crate::pace::founds;
 use crate::slot::Slot;
 
@@ -19,6 +20,9 @@ impl Simulation {
         let &Fault { member, action, .. } = fault;
         observe(self.now, self.pace.cycle(), member, Record::Fault(fault));
         self.links.disturb(self.now, member, action);
+        if !matches!(action, Action::StickInput { .. } | Action::FreeInput { .. }) {
+            self.input_reports.iter_mut().flatten().for_each(InputReports::begin_again);
+        }
         let is_there = match member {
             Member::Station(station) => station.index() < self.stations.len(),
             Member::RemoteIo(program) | Member::Plant(program) => {
@@ -61,6 +65,12 @@ impl Simulation {
             (Member::RemoteIo(_) | Member::Twin(_), Action::Unset { input }) => {
                 let unforce = RemoteIoInput::Unforce(SignalPlace::Input(input));
                 self.give(member, Input::RemoteIo(unforce), observe);
+            }
+            (Member::RemoteIo(_) | Member::Twin(_), Action::StickInput { input, value }) => {
+                self.stick_input(member, input, Some(value));
+            }
+            (Member::RemoteIo(_) | Member::Twin(_), Action::FreeInput { input }) => {
+                self.stick_input(member, input, None);
             }
             (Member::RemoteIo(_) | Member::Twin(_), Action::Write { .. }) => {
                 if let Some(write) = fault.write() {

@@ -22,6 +22,7 @@ impl Hash for Simulation {
             disks,
             referees,
             // They only judge.
+            input_reports: _,
             signals: _,
             knowable: _,
             tallies: _,

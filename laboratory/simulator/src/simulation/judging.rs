@@ -31,6 +31,7 @@ impl Simulation {
             self.tallies[program.index()].count(event);
             return;
         }
+        let unreported = self.judge_inputs(member, program, event);
         let mut holder = None;
         let counts = self.referees[program.index()].counts(member);
         if let (Event::Sampled { moment, before, .. }, true) = (event, counts) {
@@ -66,7 +67,7 @@ impl Simulation {
         if let (Event::Sampled { moment, inputs, .. }, true) = (event, counts) {
             let settings = &self.parts.remote_ios[program.index()];
             let wrong = self.signals.judge(settings, *moment, inputs);
-            found = found.or(wrong);
+            found = found.or(wrong).or(unreported);
             let referee = &self.referees[program.index()];
             self.signals.note(program, referee.truth());
         }

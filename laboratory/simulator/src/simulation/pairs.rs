@@ -1,7 +1,7 @@
 //! Two remote I/Os of one program.
 
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
-use understudy_remote_io::{PairSettings, RemoteIo, Settings};
+use understudy_remote_io::{Event, PairSettings, RemoteIo, Settings};
 use understudy_wire::{Image, Member, Part, ProgramId, ProgramSet, StateChoice};
 
 use super::{Observe, Record, Simulation};
@@ -138,11 +138,31 @@ impl Simulation {
     }
 
     /// An input module of one of two remote I/Os shows a fixed value of an input from now on; the true one again with `None`.
-    pub fn stick_input(&mut self, member: Member, input: usize, value: Option<bool>) {
-        if let Some(program) = member.sampled_program() {
-            self.modules[program.index()].stick(member, input, value);
+    pub(super) fn stick_input(&mut self, member: Member, input: u16, value: Option<bool>) {
+        let width = |program: ProgramId| self.parts.remote_ios[program.index()].undriven.width();
+        let there = member.sampled_program().filter(|it| usize::from(input) < width(*it));
+        if let Some(program) = there {
+            self.modules[program.index()].stick(member, usize::from(input), value);
             self.show_field(program);
         }
+    }
+
+    /// Takes an event of a remote I/O: what should have been reported of the input modules of its program.
+    pub(super) fn judge_inputs(
+        &mut self,
+        member: Member,
+        program: ProgramId,
+        event: &Event,
+    ) -> Option<Violation> {
+        let reports = self.input_reports[program.index()].as_mut()?;
+        let field = self.plants.field(program)?;
+        let modules = &self.modules[program.index()];
+        let shown = [Member::RemoteIo(program), Member::Twin(program)]
+            .map(|member| modules.shown(member, &field.sensors));
+        let paired = &self.parts.remote_ios[program.index()].paired_inputs;
+        let input = reports.note(paired, member, event, shown.each_ref().map(AsRef::as_ref))?;
+        let moment = self.referees[program.index()].truth().map(|(moment, _)| moment);
+        Some(Violation::InputsNotReported { moment: moment.unwrap_or_default(), input })
     }
 
     pub(super) fn show_field(&mut self, program: ProgramId) {

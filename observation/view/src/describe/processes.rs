@@ -239,12 +239,15 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
             format!("{assignment} is set at {name}")
         }
         Action::Unset { input } => {
-            let signal = match member {
-                Member::RemoteIo(program) => members.signal(program, SignalPlace::Input(input)),
-                _ => None,
-            };
-            let input = signal.map_or("an input", |signal| &signal.name);
-            format!("{input} of {name} is the field's again")
+            format!("{} of {name} is the field's again", input_of(member, input, members))
+        }
+        Action::StickInput { input, value } => {
+            let value = u8::from(value);
+            format!("the module of {name} shows {value} for {}", input_of(member, input, members))
+        }
+        Action::FreeInput { input } => {
+            let input = input_of(member, input, members);
+            format!("the module of {name} shows the true value of {input} again")
         }
         Action::Choose { choice: StateChoice::Cold } => {
             format!("the operator orders a cold start of the program of {name}")
@@ -256,4 +259,11 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
         }
         other => format!("{} of {name}", other.word()),
     }
+}
+
+/// The name of an input of the program of a remote I/O, by its first bit.
+fn input_of(member: Member, input: u16, members: &Members) -> &str {
+    let program = member.sampled_program();
+    let signal = program.and_then(|it| members.signal(it, SignalPlace::Input(input)));
+    signal.map_or("an input", |signal| &signal.name)
 }

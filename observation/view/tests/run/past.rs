@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 
 use rand::RngExt;
 use rand::seq::IndexedRandom;
@@ -12,7 +13,7 @@ use understudy_journal::{Journal, Record, keep_cluster};
 use understudy_testing::Folder;
 use understudy_view::{Bounds, Following, Model, RemoteIoState, Run, Source};
 
-use crate::support::{cell, records, scenario};
+use crate::support::{cell, example, records, scenario};
 
 const CYCLES: u64 = 1200;
 
@@ -74,16 +75,21 @@ pub(crate) fn random_scenario(random: &mut Pcg64) -> String {
     text
 }
 
-/// A run of a journal in small segments, of which the oldest may be gone.
+/// A run of the press cell.
 fn run_of(folder: &Folder, cell: &Cluster, records: &[Record]) -> Run {
     let source = folder.join("source");
     fs::create_dir_all(&source).expect("a folder");
     for file in press_cell() {
         fs::write(source.join(file.name), file.text).expect("written");
     }
+    run_of_file(folder, &source.join("cluster.toml"), cell, records)
+}
+
+/// A run of a journal in small segments, of which the oldest may be gone.
+fn run_of_file(folder: &Folder, file: &Path, cell: &Cluster, records: &[Record]) -> Run {
     let path = folder.join("run");
     fs::create_dir_all(&path).expect("a folder");
-    keep_cluster(&path, &source.join("cluster.toml"), cell).expect("kept");
+    keep_cluster(&path, file, cell).expect("kept");
     let mut writer = Journal::create(&path.join("journal.jsonl"), 1_200_000).expect("created");
     records.iter().for_each(|record| writer.write(record));
     assert_eq!(writer.finish().lost, 0);
@@ -186,6 +192,43 @@ fn the_present_is_known_from_the_middle_of_a_journal() {
         }
         assert!(begun.len() > 1, "{begun:?}");
     }
+}
+
+/// Deadlines of a twin count as those of its remote I/O, for a reader that begins where either of the two is the author.
+#[test]
+fn the_present_is_known_whichever_remote_io_drives() {
+    let cell = example("twin-remote-io");
+    let file =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/twin-remote-io/cluster.toml");
+    let mut text = format!("title = \"switchovers\"\ncycles = {CYCLES}\nseed = 1\n");
+    for (at, action, station) in [
+        (100, "crash", "robot-io"),
+        (500, "restart", "robot-io"),
+        (800, "stop", "robot-io-2"),
+        (830, "continue", "robot-io-2"),
+        (900, "crash", "press-io"),
+    ] {
+        text += &format!("[[step]]\nat = {at}\naction = \"{action}\"\nstation = \"{station}\"\n");
+    }
+    let records = records(&cell, &scenario(&cell, &text), 1);
+    let folder = Folder::new("run-past-twins");
+    let run = run_of_file(&folder, &file, &cell, &records);
+    let mut whole = run.model(Bounds::default());
+    records.iter().for_each(|record| whole.note(record));
+    let mut begun = Vec::new();
+    for cycle in (0..CYCLES as i64 + 500).step_by(50) {
+        let Some(source) = run.follow_from(cycle) else {
+            continue;
+        };
+        let model = read(&run, source);
+        begun.extend(model.read_from());
+        let context = format!("from cycle {:?}:\n{text}", model.read_from());
+        pretty(&present(&whole), &present(&model), &context);
+        assert_eq!(lasting(&whole), lasting(&model), "{context}");
+    }
+    begun.dedup();
+    let drives = |twin: bool| begun.iter().any(|from| (150..800).contains(from) == twin);
+    assert!(begun.len() > 2 && drives(true) && drives(false), "{begun:?}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The machines of a plant, on which `understudy allocate` places stations, understudies and spares.
+//! The machines of a plant, on which `understudy allocate` places stations, understudies, spares and remote I/Os.
 
 use toml::de::DeTable;
 use understudy_text::Diagnostic;
@@ -20,6 +20,8 @@ pub struct PlantMachine {
     pub switch: Option<String>,
     /// Stations and spares that it executes, at most.
     pub stations: u32,
+    /// Remote I/Os that it executes, at most.
+    pub remote_ios: u32,
     /// Operations in a second that it executes.
     pub capacity: u32,
 }
@@ -56,6 +58,7 @@ pub(super) fn machines(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) ->
             feeder,
             switch,
             stations: fields.count("stations", diagnostics),
+            remote_ios: fields.count("remote_ios", diagnostics),
             capacity: fields.count("capacity", diagnostics),
         });
     }

@@ -1,0 +1,108 @@
+//! Whether modules drive what an author has driven lately: from the writes that the devices have recorded, and the outputs that authors have recorded.
+//!
+//! Both have times of the one monotonic clock of the host. An actuator gets the outputs of both modules through diodes, so where each write is proved,
+//! what it gets is outputs of the program or 0.
+
+use std::collections::VecDeque;
+
+/// Outputs at a time, as coils.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Outputs {
+    pub(super) at_ns: u64,
+    pub(super) coils: u64,
+}
+
+/// What may be driven, in ns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rule {
+    /// How old the outputs of an author may be, at most.
+    pub(super) oldest: u64,
+    /// How much later than the write an author may record them.
+    pub(super) recorded_after: u64,
+    /// How long around the end of a process its last records may be missing.
+    pub(super) unrecorded: u64,
+}
+
+/// Writes that no record explains.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Found {
+    /// Their number.
+    pub(super) unproved: u64,
+    /// Those after the end of a process that may have driven them and has not recorded it.
+    pub(super) unrecorded: u64,
+}
+
+/// Checks the writes of one device. All rows are in the order of their times.
+pub(super) fn judge(writes: &[Outputs], driven: &[Outputs], ends: &[u64], rule: Rule) -> Found {
+    let mut found = Found::default();
+    let mut next = driven.iter().peekable();
+    let mut recent: VecDeque<&Outputs> = VecDeque::new();
+    for write in writes {
+        let newest = write.at_ns.saturating_add(rule.recorded_after);
+        while let Some(it) = next.next_if(|it| it.at_ns <= newest) {
+            recent.push_back(it);
+        }
+        while recent.front().is_some_and(|it| it.at_ns.saturating_add(rule.oldest) < write.at_ns) {
+            recent.pop_front();
+        }
+        if write.coils == 0 || recent.iter().any(|it| it.coils == write.coils) {
+            continue;
+        }
+        let may_be_lost = |end: &u64| {
+            let lasts = rule.unrecorded + rule.oldest;
+            write.at_ns.saturating_add(rule.unrecorded) >= *end
+                && write.at_ns <= end.saturating_add(lasts)
+        };
+        if ends.iter().any(may_be_lost) {
+            found.unrecorded += 1;
+        } else {
+            found.unproved += 1;
+        }
+    }
+    found
+}
+
+/// Longest time without a write to any of these devices, in ns.
+pub(super) fn longest_gap(devices: &[&[Outputs]]) -> u64 {
+    let mut times: Vec<u64> =
+        devices.iter().flat_map(|writes| writes.iter().map(|write| write.at_ns)).collect();
+    times.sort_unstable();
+    times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RULE: Rule = Rule { oldest: 60, recorded_after: 10, unrecorded: 30 };
+
+    fn row(of: &[(u64, u64)]) -> Vec<Outputs> {
+        of.iter().map(|&(at_ns, coils)| Outputs { at_ns, coils }).collect()
+    }
+
+    /// An author drives 1 and, from 100 on, 2.
+    #[test]
+    fn a_module_drives_what_an_author_has_driven_lately_or_nothing() {
+        let driven: Vec<(u64, u64)> =
+            (0..20).map(|cycle| (cycle * 10, if cycle < 10 { 1 } else { 2 })).collect();
+        let driven = row(&driven);
+        let check = |writes: &[(u64, u64)], ends: &[u64], unproved: u64, unrecorded: u64| {
+            let found = judge(&row(writes), &driven, ends, RULE);
+            assert_eq!(found, Found { unproved, unrecorded }, "{writes:?}");
+        };
+        check(&[(12, 1), (95, 2), (101, 2), (150, 1), (160, 0), (190, 2)], &[], 0, 0);
+        // The last 1 was driven at 90; nothing has driven 3.
+        check(&[(151, 1)], &[], 1, 0);
+        check(&[(80, 2)], &[], 1, 0);
+        check(&[(50, 3), (52, 0)], &[], 1, 0);
+        // The author ends at 200, and what it has driven last may not be recorded.
+        check(&[(195, 3), (230, 3), (291, 3)], &[200], 1, 2);
+    }
+
+    #[test]
+    fn one_module_alone_leaves_no_gap() {
+        let (first, twin) = (row(&[(0, 1), (10, 1), (20, 1)]), row(&[(5, 1), (30, 1), (70, 1)]));
+        assert_eq!(longest_gap(&[&first, &twin]), 40);
+        assert_eq!(longest_gap(&[&first]), 10);
+    }
+}
