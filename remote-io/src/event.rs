@@ -96,6 +96,9 @@ pub enum Event {
         /// the newest applied output.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         lost: Option<u64>,
+        /// What the retained operator inputs have now, where that is not what they had in that state.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        inputs: Option<OldInputs>,
         /// Whether the operator has to release the outputs.
         awaits_release: bool,
     },
@@ -146,6 +149,9 @@ pub enum Event {
         /// Why the program does not go on from the newest state by itself.
         #[serde(default, skip_serializing_if = "AskReason::is_doubt")]
         reason: AskReason,
+        /// What the retained operator inputs have after the start from the newest state, where that is not what they had in it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        inputs: Option<OldInputs>,
     },
     /// A station has returned that can prove the state, which was lost or disputed: the program continues.
     StateRecovered {
@@ -440,6 +446,16 @@ pub enum AskReason {
     NotWhole,
     /// It is as new as the newest applied output, and the operator chooses each start: `restart = "operator"`.
     Configured,
+}
+
+/// What retained operator inputs have after a start from a state of which there is no note.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OldInputs {
+    /// Their initial values: there is no note that can be used.
+    Initial,
+    /// The values of the newest note, which is older.
+    Of(Moment),
 }
 
 impl AskReason {

@@ -20,7 +20,7 @@ mod votes;
 
 pub use channel::Channel;
 pub use diagnosis::Diagnosis;
-pub use event::{AskReason, Event, Lacking, LackingReason, Missing};
+pub use event::{AskReason, Event, Lacking, LackingReason, Missing, OldInputs};
 pub use foresight::Foreseen;
 pub use paired_inputs::PairedInput;
 pub use ramp::Ramp;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 use understudy_cluster::read;
 use understudy_cycle::RemoteIoInput;
-use understudy_remote_io::Event;
+use understudy_remote_io::{Event, OldInputs};
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation, parts};
 use understudy_wire::{
     Image, Member, PointValue, ProgramId, Role, StateChoice, StationId, Write, WriteId,
@@ -113,6 +113,8 @@ struct Seen {
     cold_starts: u32,
     /// Of the first program.
     warm_starts: u32,
+    /// What its questions and warm starts say of retained inputs.
+    inputs: Vec<Option<OldInputs>>,
 }
 
 impl Seen {
@@ -136,8 +138,12 @@ impl Seen {
                 self.outputs[program.index()] = Some(outputs.clone())
             }
             Event::StartedCold { .. } => self.cold_starts += 1,
-            Event::StartedWarm { .. } if member == Member::RemoteIo(PROGRAM) => {
-                self.warm_starts += 1
+            Event::StartedWarm { inputs, .. } if member == Member::RemoteIo(PROGRAM) => {
+                self.warm_starts += 1;
+                self.inputs.push(*inputs);
+            }
+            Event::StateLost { inputs, .. } if member == Member::RemoteIo(PROGRAM) => {
+                self.inputs.push(*inputs);
             }
             _ => {}
         }
@@ -384,6 +390,53 @@ fn an_input_keeps_its_value_over_a_power_failure() {
         bench.pass(60);
         assert_eq!(bench.seen.warm_starts, 2);
         assert_eq!((bench.count(), bench.echo()), (1.0, -4.0));
+    }
+}
+
+/// The notes of the remote I/O are lost, or end before the states: the operator reads, before the choice and after it, that the inputs have not the values that
+/// they had in the state.
+#[test]
+fn an_input_whose_value_is_lost_is_said() {
+    for is_lost in [true, false] {
+        let text = CLUSTER.replace("initial = 7.0", "initial = 7.0, retain = true");
+        let retentive = COUNTER.replace("VAR_OUTPUT", "VAR_OUTPUT RETAIN");
+        let mut bench = Bench::of(cluster_of(&text, &retentive), Network::default(), 1);
+        let restart = |bench: &mut Bench| {
+            let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
+            let remote_ios = [PROGRAM, READER_PROGRAM].map(Member::RemoteIo);
+            for action in [Action::Crash, Action::Restart] {
+                for member in stations.into_iter().chain(remote_ios) {
+                    bench.fault(member, action.clone());
+                }
+                bench.pass(60);
+            }
+            bench.pass(100);
+        };
+        bench.write(&write(1, 1, VALUE, real(-3.0)));
+        bench.pass(8);
+        if !is_lost {
+            restart(&mut bench);
+            assert_eq!((bench.seen.warm_starts, bench.seen.inputs.as_slice()), (1, &[None][..]));
+            bench.simulation.write_protect(PROGRAM);
+        }
+        bench.write(&write(1, 2, VALUE, real(-4.0)));
+        bench.pass(60);
+        assert_eq!(bench.echo(), -4.0);
+        if is_lost {
+            bench.simulation.damage_notes(PROGRAM);
+            bench.simulation.write_protect(PROGRAM);
+        }
+        bench.seen.inputs.clear();
+        restart(&mut bench);
+        let choice = StateChoice::Newest { cycle: None };
+        bench.fault(Member::RemoteIo(PROGRAM), Action::Choose { choice });
+        bench.pass(60);
+        // A note that is not the newest one asks nothing: nothing shows that newer outputs were applied.
+        let (echo, old, times) =
+            if is_lost { (7.0, "Some(Initial)", 2) } else { (-3.0, "Some(Of(", 1) };
+        assert_eq!(bench.echo(), echo, "{is_lost}");
+        let said: Vec<String> = bench.seen.inputs.iter().map(|it| format!("{it:?}")).collect();
+        assert!(said.len() == times && said.iter().all(|it| it.starts_with(old)), "{said:?}");
     }
 }
 

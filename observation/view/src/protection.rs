@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_remote_io::AskReason;
+use understudy_remote_io::{AskReason, OldInputs};
 
 /// Protection of a program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -44,6 +44,22 @@ pub struct LostState {
     pub asks: bool,
     /// Why the program does not start by itself from a state that is not lost: its values or names have changed, or the cluster file says so.
     pub reason: Option<&'static str>,
+    /// What levels and setpoints with `retain` have after the start from the newest state, where that is not what they had in it.
+    pub inputs: Option<String>,
+}
+
+/// What levels and setpoints with `retain` have after a start.
+pub(crate) fn old_inputs_text(inputs: OldInputs) -> String {
+    let kept = "levels and setpoints with `retain`";
+    match inputs {
+        OldInputs::Initial => {
+            format!("{kept} have their INITIAL values: there is no note that has them")
+        }
+        OldInputs::Of(moment) => format!(
+            "{kept} have OLDER values than the state: the newest note is of cycle {} of the cluster",
+            moment.cycle.0
+        ),
+    }
 }
 
 /// Why a program does not start by itself from a state that is not lost.
@@ -84,9 +100,11 @@ impl LostState {
             Some(reason) => format!("NOT STARTED since cycle {since}: {reason}"),
             None => format!("STATE LOST since cycle {since}"),
         };
+        let inputs = self.inputs.as_ref();
+        let inputs = inputs.map_or_else(String::new, |text| format!("; after accept-state {text}"));
         match (self.newest, &self.holder) {
             (Some(newest), Some(holder)) => format!(
-                "{lost}: the newest available state is of cycle {newest} of the cluster{age}, in {holder}{doubt}"
+                "{lost}: the newest available state is of cycle {newest} of the cluster{age}, in {holder}{doubt}{inputs}"
             ),
             _ => format!("{lost}: no station has a state of the program"),
         }

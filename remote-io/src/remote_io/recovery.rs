@@ -201,8 +201,12 @@ impl RemoteIo {
             || self.settings.restart == Some(Restart::Operator)
             || self.may_have_the_wrong_program();
         let reason = self.reason_to_ask();
+        // Stations that hold a state recall the inputs of its last sample.
+        let retained = newest.filter(|_| self.holders.newest().is_none());
+        let inputs = retained.and_then(|newest| self.old_inputs(newest));
         self.question = Some(Question::StateLost { told: newest, newest });
-        self.report(Event::StateLost { moment, applied, newest, holder, asks, reason });
+        let event = Event::StateLost { moment, applied, newest, holder, asks, reason, inputs };
+        self.report(event);
         if !asks {
             self.start_cold(moment, applied);
         }
@@ -304,8 +308,7 @@ impl RemoteIo {
         }
         let void = self.writing.lose(&self.settings.operator_inputs, moment, |_| true);
         self.report_void(&void);
-        let is_first = matches!(self.knowledge, Knowledge::Listening { .. });
-        if state.is_none() && is_first {
+        if state.is_none() && self.is_first_start() {
             self.take_up_writes();
         }
         self.question = None;

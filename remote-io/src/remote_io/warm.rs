@@ -22,8 +22,8 @@ use understudy_wire::{
 };
 
 use super::recovery::Verdict;
-use super::{Authority, RemoteIo};
-use crate::event::{AskReason, Event};
+use super::{Authority, Knowledge, RemoteIo};
+use crate::event::{AskReason, Event, OldInputs};
 use crate::history::History;
 use crate::settings::{Release, Restart};
 
@@ -310,11 +310,13 @@ impl RemoteIo {
         let lost = applied.filter(|applied| applied.epoch == stepped.epoch);
         let lost = lost.map(|applied| applied.cycle.0.saturating_sub(stepped.cycle.0));
         let lost = if self.begun() == Some(kept.holding.born) { Some(0) } else { lost };
+        let inputs = self.old_inputs(stepped);
         self.report(Event::StartedWarm {
             born: moment,
             from,
             retained: stepped,
             lost,
+            inputs,
             awaits_release,
         });
         // A station has taken over the values of any other program into that of its configuration.
@@ -325,14 +327,42 @@ impl RemoteIo {
         self.sample_from(moment, history, None);
     }
 
+    /// What retained operator inputs have after a start from a state that was stepped with the sample of `stepped`, where that may be another value than in
+    /// that sample: this remote I/O takes their values from its newest note. The sample after the note was not applied as far as that tells, so no write
+    /// was answered that is in it.
+    pub(super) fn old_inputs(&self, stepped: Moment) -> Option<OldInputs> {
+        let retains = self.settings.operator_inputs.iter().any(|input| input.retains);
+        if !retains || !self.is_first_start() {
+            return None;
+        }
+        let sampled = self.usable_note().map(|note| note.recalled.sampled);
+        match sampled {
+            None => Some(OldInputs::Initial),
+            Some(sampled) => {
+                let is_of_it =
+                    sampled.epoch == stepped.epoch && sampled.cycle.0 + 1 >= stepped.cycle.0;
+                (!is_of_it).then_some(OldInputs::Of(sampled))
+            }
+        }
+    }
+
+    /// Whether no history has been sampled in this life: the operator inputs have no values yet.
+    pub(super) fn is_first_start(&self) -> bool {
+        matches!(self.knowledge, Knowledge::Listening { .. })
+    }
+
+    /// The newest note that has the inputs of its program.
+    fn usable_note(&self) -> Option<&Note> {
+        let width = self.settings.undriven.width();
+        let last = self.noting.last.as_ref();
+        last.filter(|note| note.recalled.inputs.width() == width)
+    }
+
     /// At the first start of this life, warm or cold: takes up the operator inputs that keep their values over a power failure, and the writes that
     /// were in effect.
     pub(super) fn take_up_writes(&mut self) {
-        let width = self.settings.undriven.width();
-        let last = self.noting.last.as_ref();
-        let last = last.filter(|note| note.recalled.inputs.width() == width);
-        if let Some(note) = last {
-            self.writing.start(&self.settings.operator_inputs, &note.recalled);
+        if let Some(recalled) = self.usable_note().map(|note| note.recalled.clone()) {
+            self.writing.start(&self.settings.operator_inputs, &recalled);
         }
     }
 }

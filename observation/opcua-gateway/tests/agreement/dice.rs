@@ -271,6 +271,7 @@ impl Dice<'_> {
                 holder: Some(station),
                 asks: true,
                 reason: Default::default(),
+                inputs: None,
             },
             7 => RemoteIoEvent::StateRecovered { moment, from: station },
             8 => RemoteIoEvent::StartedCold { born: moment, awaits_release: true, lost: None },

@@ -3,14 +3,16 @@
 use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
-use understudy_remote_io::{AskReason, Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
+use understudy_remote_io::{
+    AskReason, Event as RemoteIoEvent, Lacking, LackingReason, OldInputs, ValueFault,
+};
 use understudy_wire::{
     Configurations, Member, Moment, Part, ProgramSet, SignalPlace, StationId, StationSet, Word,
 };
 
 use super::signals::Names;
 use super::{Words, list, program_name, programs, source_text, stations};
-use crate::protection::asked_because;
+use crate::protection::{asked_because, old_inputs_text};
 
 descriptions! { station: StationEvent, members: Members;
     Published { words, .. } => "published" Info format!("publishes {}", words_text(words, members));
@@ -73,10 +75,10 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
             lost.cycle.0
         )
     };
-    StartedWarm { from, retained, lost: Some(0), awaits_release, .. } => "started-warm" Notice
-        started_warm_text(members, *from, *retained, Some(0), *awaits_release);
-    StartedWarm { from, retained, lost, awaits_release, .. } => "started-warm" Alarm
-        started_warm_text(members, *from, *retained, *lost, *awaits_release);
+    StartedWarm { from, retained, lost: Some(0), inputs: None, awaits_release, .. } => "started-warm" Notice
+        started_warm_text(members, *from, *retained, (Some(0), None), *awaits_release);
+    StartedWarm { from, retained, lost, inputs, awaits_release, .. } => "started-warm" Alarm
+        started_warm_text(members, *from, *retained, (*lost, *inputs), *awaits_release);
     AdoptedLineage { lineage, from, .. } => "adopted-lineage" Notice
         format!("continues from the state of {}, at lineage {lineage}", name(*from, members));
     Disputed { stations: who, .. } => "disputed" Alarm format!(
@@ -87,8 +89,11 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         "its program does not start: {others} members of the cluster have another configuration, and only {stations} stations have its own; \
          correct the configuration, or order a cold start"
     );
-    StateLost { applied, newest, holder, asks, reason, .. } => "state-lost" Alarm
-        state_lost_text(*applied, newest.zip(*holder).map(|(newest, holder)| (newest, name(holder, members))), *asks, *reason);
+    StateLost { applied, newest, holder, asks, reason, inputs, .. } => "state-lost" Alarm {
+        let newest = newest.zip(*holder).map(|(newest, holder)| (newest, name(holder, members)));
+        let text = state_lost_text(*applied, newest, *asks, *reason);
+        inputs.map_or_else(|| text.clone(), |inputs| format!("{text}; after accept-state {}", old_inputs_text(inputs)))
+    };
     StateRecovered { from, .. } => "state-recovered" Notice
         format!("{} has returned with the state of its program", name(*from, members));
     ChoiceRefused { refusal, .. } => "choice-refused" Warning format!("refuses the operator's choice: {refusal}");
@@ -215,7 +220,7 @@ fn started_warm_text(
     names: &Names<'_>,
     from: StationId,
     retained: Moment,
-    lost: Option<u64>,
+    (lost, inputs): (Option<u64>, Option<OldInputs>),
     awaits_release: bool,
 ) -> String {
     let from = name(from, names);
@@ -233,8 +238,9 @@ fn started_warm_text(
         None => "it is not known how many cycles with applied outputs are lost".to_owned(),
     };
     let release = if awaits_release { "; the operator has to release its outputs" } else { "" };
+    let inputs = inputs.map_or_else(String::new, |inputs| format!("; {}", old_inputs_text(inputs)));
     format!(
-        "starts its program warm, with the retentive values of {kept} that {from} has kept; {lost}{release}"
+        "starts its program warm, with the retentive values of {kept} that {from} has kept; {lost}{inputs}{release}"
     )
 }
 

@@ -209,7 +209,7 @@ impl Model {
         }
         self.fold_process_alarms(record, cycle);
         self.host_alarm(record, member, cycle, event);
-        self.spare_reported(member, cycle, event);
+        self.spare_reported(member, (cycle, record.at_ns), event);
         // Counted, and no event: one comes every few seconds.
         if !matches!(event, HostEvent::Timed { .. }) {
             self.happened(record, cycle, None);

@@ -136,9 +136,9 @@ impl Model {
                 }
                 own(ProgramChange::Started { awaits_release: *awaits_release })
             }
-            RemoteIoEvent::StartedWarm { awaits_release, lost, .. } => {
+            RemoteIoEvent::StartedWarm { awaits_release, lost, inputs, .. } => {
                 self.alarms.all_over(&record.name, &QUESTIONS, cycle);
-                if *lost != Some(0) {
+                if *lost != Some(0) || inputs.is_some() {
                     let text = self.described(record).text;
                     self.alarms.occurred(subject(STARTED_WARM), cycle, text);
                 }
@@ -181,7 +181,8 @@ impl Model {
                 None
             }
             RemoteIoEvent::Flagged { station, .. } => {
-                self.slot_flagged(*station, cycle);
+                let by = record.member.unwrap_or(Member::RemoteIo(program));
+                self.slot_flagged(by, *station, record.at_ns);
                 let flagged = StationChange::Flagged(program);
                 Some(Change::Station(*station, flagged))
             }

@@ -11,7 +11,7 @@ use super::pairs::{INPUT_MODULES, PARTNER_LOST};
 use super::silence::{NOT_RECEIVED, Silence};
 use super::standing::{Change, ProgramChange, Standing};
 use crate::alarm::{STATE_LOST, Subject, UNPROTECTED};
-use crate::protection::{LackingStation, LostState, Protection, asked_because};
+use crate::protection::{LackingStation, LostState, Protection, asked_because, old_inputs_text};
 use crate::station::StationState;
 
 /// The stations that a remote I/O receives, those of them that publish for its program, and whether it receives no station at all.
@@ -90,7 +90,7 @@ impl Model {
                 self.attributed(program, cycle, causes);
                 self.protection_is(program, cycle, protection);
             }
-            RemoteIoEvent::StateLost { applied, newest, holder, asks, reason, .. } => {
+            RemoteIoEvent::StateLost { applied, newest, holder, asks, reason, inputs, .. } => {
                 let known = |moment| self.cycles.of_known(moment);
                 let until = applied.map_or(Some(cycle), known);
                 let age = until.zip(newest.and_then(known)).map(|(until, newest)| until - newest);
@@ -102,6 +102,7 @@ impl Model {
                     age_cycles: age.and_then(|age| u64::try_from(age).ok()).filter(is_old),
                     asks: *asks,
                     reason: asked_because(*reason),
+                    inputs: inputs.map(old_inputs_text),
                 };
                 self.alarms.raise_or_retell(subject(STATE_LOST), cycle, lost.text());
                 self.lost_is(program, cycle, Some(lost));

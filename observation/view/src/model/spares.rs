@@ -3,7 +3,7 @@
 //! A spare reports to a few remote I/Os. It is received where one of them that reports itself receives it: what a silent member
 //! recorded last is the past.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use understudy_bus::HostEvent;
 use understudy_wire::{Member, StationId};
@@ -20,8 +20,8 @@ enum Report {
     /// It receives its reports.
     Received {
         serves: Option<String>,
-        /// The cycle in which that was new.
-        since: i64,
+        /// When that was new, on the clock of that member.
+        since_ns: u64,
     },
     /// It does not receive them any more.
     Lost,
@@ -32,15 +32,20 @@ enum Report {
 pub(super) struct Spares {
     /// By spare: what each member says of it.
     reports: BTreeMap<String, BTreeMap<Member, Report>>,
-    /// The cycle in which a slot was flagged last.
-    flagged: BTreeMap<StationId, i64>,
+    /// When a member has flagged a slot last, on its clock.
+    flagged: BTreeMap<(Member, StationId), u64>,
 }
 
 impl Model {
-    pub(super) fn spare_reported(&mut self, member: Member, cycle: i64, event: &HostEvent) {
+    pub(super) fn spare_reported(
+        &mut self,
+        member: Member,
+        (cycle, at_ns): (i64, u64),
+        event: &HostEvent,
+    ) {
         let (spare, report) = match event {
             HostEvent::SpareReceived { spare, serves } => {
-                (spare, Report::Received { serves: serves.clone(), since: cycle })
+                (spare, Report::Received { serves: serves.clone(), since_ns: at_ns })
             }
             HostEvent::SpareLost { spare } => (spare, Report::Lost),
             // A new process knows of no spare yet.
@@ -65,9 +70,9 @@ impl Model {
     }
 
     /// A remote I/O has flagged a station.
-    pub(super) fn slot_flagged(&mut self, station: StationId, cycle: i64) {
+    pub(super) fn slot_flagged(&mut self, member: Member, station: StationId, at_ns: u64) {
         if self.cluster.agreement().schedule.spare_slots().contains(station) {
-            self.spares.flagged.insert(station, cycle);
+            self.spares.flagged.insert((member, station), at_ns);
         }
     }
 
@@ -77,22 +82,27 @@ impl Model {
         spares
             .map(|(name, reports)| {
                 let present = reports.iter().filter(|(member, _)| standing.reports(**member));
-                let received = present.filter_map(|(_, report)| match report {
-                    Report::Received { serves, since } => Some((serves.clone(), *since)),
+                let received = present.filter_map(|(member, report)| match report {
+                    Report::Received { serves, since_ns } => Some((serves, *member, *since_ns)),
                     Report::Lost => None,
                 });
                 // Of several members the one that knows of a group has the newer report, or will have it within seconds.
-                let received = received.max_by(|one, other| one.0.cmp(&other.0));
+                let received: Vec<_> = received.collect();
+                let newest = received.iter().map(|(serves, ..)| *serves).max();
+                let told = received.iter().filter(|(serves, ..)| Some(*serves) == newest);
+                // Members have clocks of their own: each one compares what it has recorded itself.
+                let flagged = told.flat_map(|&(_, member, since_ns)| {
+                    let flagged = self.spares.flagged.iter();
+                    let later =
+                        flagged.filter(move |((by, _), at)| *by == member && **at > since_ns);
+                    later.map(|((_, slot), _)| self.members.name(Member::Station(*slot)).to_owned())
+                });
+                let flagged_slots: BTreeSet<String> = flagged.collect();
                 SpareSnapshot {
                     name: name.clone(),
-                    received: received.is_some(),
-                    flagged_slots: received.as_ref().map_or_else(Vec::new, |(_, since)| {
-                        let flagged = self.spares.flagged.iter().filter(|(_, at)| *at > since);
-                        flagged
-                            .map(|(slot, _)| self.members.name(Member::Station(*slot)).to_owned())
-                            .collect()
-                    }),
-                    serves: received.and_then(|(serves, _)| serves),
+                    received: newest.is_some(),
+                    serves: newest.cloned().flatten(),
+                    flagged_slots: flagged_slots.into_iter().collect(),
                 }
             })
             .collect()

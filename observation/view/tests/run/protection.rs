@@ -434,8 +434,9 @@ fn a_state_that_is_as_new_as_all_that_is_known_is_not_called_0_cycles_old() {
         let mut model = model(&cluster, &short, 1);
         let holder = Some(StationId(0));
         let (applied, newest) = (Some(moment), Some(newest));
-        let (asks, reason) = (true, AskReason::Doubt);
-        let event = RemoteIoEvent::StateLost { moment, applied, newest, holder, asks, reason };
+        let (asks, reason, inputs) = (true, AskReason::Doubt, None);
+        let event =
+            RemoteIoEvent::StateLost { moment, applied, newest, holder, asks, reason, inputs };
         model.note(&Record { event: Happening::RemoteIo(event), ..last.clone() });
         let alarm = model.alarms().find(|alarm| alarm.alarm == "state-lost").expect("an alarm");
         let doubts =

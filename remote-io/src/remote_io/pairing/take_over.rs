@@ -120,6 +120,7 @@ impl RemoteIo {
         let (holder, newest) = newest.unzip();
         self.question = Some(Question::StateLost { told: newest, newest });
         let (asks, reason) = (true, AskReason::Doubt);
-        self.report(Event::StateLost { moment, applied, newest, holder, asks, reason });
+        let inputs = None;
+        self.report(Event::StateLost { moment, applied, newest, holder, asks, reason, inputs });
     }
 }
