@@ -355,7 +355,7 @@ fn an_input_keeps_its_value_over_a_power_failure() {
         let remote_ios = [PROGRAM, READER_PROGRAM].map(Member::RemoteIo);
         for action in [Action::Crash, Action::Restart] {
             for member in stations.map(Member::Station).into_iter().chain(remote_ios) {
-                bench.fault(member, action.clone());
+                bench.fault(member, action);
             }
             bench.pass(60);
             bench.seen.outputs = [None, None];
@@ -406,7 +406,7 @@ fn an_input_whose_value_is_lost_is_said() {
             let remote_ios = [PROGRAM, READER_PROGRAM].map(Member::RemoteIo);
             for action in [Action::Crash, Action::Restart] {
                 for member in stations.into_iter().chain(remote_ios) {
-                    bench.fault(member, action.clone());
+                    bench.fault(member, action);
                 }
                 bench.pass(60);
             }
