@@ -247,7 +247,9 @@ fn group_overview(
     spares: &[SpareOverview],
 ) -> GroupOverview {
     let name = plant.groups[group].name.clone();
-    let here = spares.iter().filter(|spare| spare.group.as_ref() == Some(&name));
+    let here = spares.iter().filter(|spare| {
+        spare.group.as_ref() == Some(&name) && spare.state != SpareState::NotReceived
+    });
     let here: Vec<String> = here.map(|spare| spare.name.clone()).collect();
     let unknown = |reason: String| GroupOverview {
         name: name.clone(),
