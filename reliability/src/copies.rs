@@ -3,11 +3,11 @@
 //!
 //! Where each box has a repair crew, positions are independent of each other, and R(t) is the product of those of single ones.
 
-use crate::chain::{Chain, explore};
+use crate::chain::Chain;
 use crate::error::ReliabilityError;
-use crate::positions::{PairRates, Positions, chain_of, complete, steps, waiting};
+use crate::positions::{PairRates, Positions, chain_of};
 use crate::quantity::Hours;
-use crate::system::{CommonCause, CommonCauseConvention, MAXIMUM_MODEL_STATES, System};
+use crate::system::{CommonCause, CommonCauseConvention, System};
 use crate::transient::AfterFailure;
 
 /// Whether a system works at some time, with the digits of both probabilities.
@@ -28,7 +28,7 @@ impl System {
     /// The errors of [`System::chain`].
     pub fn copies_chain(&self, copies: u32) -> Result<Chain, Vec<ReliabilityError>> {
         self.check()?;
-        self.chain_of_copies(&self.copied(copies), self.lethal_to_copies())
+        chain_of(&self.copied(copies), self.lethal_to_copies(), |waiting| self.attended(waiting))
     }
 
     /// Whether [`System::copies_chain`] has failed by `hours`.
@@ -49,14 +49,14 @@ impl System {
         let most: u32 = kinds.iter().map(Positions::most_waiting).sum();
         let independent = self.crews.is_none_or(|crews| crews >= most);
         if !independent {
-            let (density, found) = at(self.chain_of_copies(&kinds, lethal)?)?;
+            let (density, found) = at(chain_of(&kinds, lethal, |waiting| self.attended(waiting))?)?;
             return Ok(Survival { working: found.working, failed: found.failed, density });
         }
         let mut logarithm = -lethal * hours;
         let mut hazard = lethal;
         for kind in kinds {
             let units = f64::from(kind.count);
-            let alone = chain_of(&[kind.one()], 0.0)?;
+            let alone = chain_of(&[kind.one()], 0.0, |_| 1.0)?;
             let (density, found) = at(alone)?;
             logarithm += units * found.log_working();
             hazard += units * density / found.working;
@@ -103,25 +103,5 @@ impl System {
         let fastest = rates.fold(0.0, f64::max);
         self.lethal_rate_of_parts()
             + self.common_cause.map_or(0.0, |cause| cause.beta.get() * fastest)
-    }
-
-    fn chain_of_copies(
-        &self,
-        kinds: &[Positions],
-        lethal: f64,
-    ) -> Result<Chain, Vec<ReliabilityError>> {
-        let (chain, _) = explore(
-            complete(kinds),
-            MAXIMUM_MODEL_STATES,
-            |_| String::new(),
-            |state, found| {
-                if lethal > 0.0 {
-                    found.push((None, lethal));
-                }
-                let attended = self.attended(waiting(kinds, state));
-                steps(kinds, state, attended, found);
-            },
-        )?;
-        Ok(chain)
     }
 }

@@ -294,5 +294,5 @@ impl LaneModules {
 /// Chain of parts alone, with a crew for each box.
 pub(crate) fn chain_of_parts(parts: &[SharedPart]) -> Result<Chain, Vec<ReliabilityError>> {
     let pairs: Vec<Positions> = parts.iter().filter_map(SharedPart::positions).collect();
-    chain_of(&pairs, parts.iter().map(SharedPart::lethal_rate).sum())
+    chain_of(&pairs, parts.iter().map(SharedPart::lethal_rate).sum(), |_| 1.0)
 }

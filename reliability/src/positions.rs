@@ -229,8 +229,13 @@ pub(crate) fn steps(
     }
 }
 
-/// Chain of positions alone, with a crew for each box, and what fails the system at this rate from every state.
-pub(crate) fn chain_of(kinds: &[Positions], lethal: f64) -> Result<Chain, Vec<ReliabilityError>> {
+/// Chain of positions alone, and what fails the system at this rate from every state; `attended` is the part of the repair rate that crews give to this
+/// number of boxes that wait: 1 where each box has a crew.
+pub(crate) fn chain_of(
+    kinds: &[Positions],
+    lethal: f64,
+    attended: impl Fn(u32) -> f64,
+) -> Result<Chain, Vec<ReliabilityError>> {
     let (chain, _) = explore(
         complete(kinds),
         MAXIMUM_MODEL_STATES,
@@ -239,7 +244,7 @@ pub(crate) fn chain_of(kinds: &[Positions], lethal: f64) -> Result<Chain, Vec<Re
             if lethal > 0.0 {
                 found.push((None, lethal));
             }
-            steps(kinds, state, 1.0, found);
+            steps(kinds, state, attended(waiting(kinds, state)), found);
         },
     )?;
     Ok(chain)
