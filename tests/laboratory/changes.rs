@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Child;
 use std::time::Instant;
 
 use nix::sys::signal::Signal;
@@ -76,6 +77,26 @@ fn counts(journal: &str) -> Vec<(u64, u64)> {
     proved.filter_map(count).collect()
 }
 
+/// By how much the count grew in each cycle after the one before, without repetitions. Outputs that are held in a stall of this machine leave a pair out,
+/// and no other step in.
+fn steps(counts: &[(u64, u64)]) -> Vec<u64> {
+    let pairs = counts.windows(2).filter(|pair| pair[1].0 == pair[0].0 + 1);
+    let mut steps: Vec<u64> = pairs.map(|pair| pair[1].1 - pair[0].1).collect();
+    steps.dedup();
+    steps
+}
+
+/// Ends a laboratory: it leaves no process, and nothing was wrong. What the remote I/O of the counter applied, as [`counts`] has it.
+fn ended_well(mut laboratory: Child, runs: &Path, run: &Path) -> Vec<(u64, u64)> {
+    signal(laboratory.id(), Signal::SIGINT);
+    laboratory.wait().expect("it ends");
+    no_orphan(runs);
+    let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(summary["violation_count"], 0, "{summary:#}");
+    counts(&fs::read_to_string(run.join("journal.jsonl")).expect("a journal"))
+}
+
 #[test]
 fn a_program_changes_while_stations_are_killed() {
     let _one = some_at_a_time();
@@ -84,8 +105,7 @@ fn a_program_changes_while_stations_are_killed() {
     let after = write_cluster(&out.join("after"), &counter("DINT", 10));
     let runs = out.join("runs");
     let more = ["--cycles", "100000", "--allow-commands"];
-    let (mut child, _errors) =
-        running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let (child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     let commander = Commander::of_run(run.clone());
     let mut records = Records::of(&run);
@@ -153,19 +173,9 @@ fn a_program_changes_while_stations_are_killed() {
         assert!(why.contains("the change to it is over"), "{again:?}: {document:#}");
     }
     done("accept");
-    signal(child.id(), Signal::SIGINT);
-    child.wait().expect("it ends");
-    no_orphan(&runs);
-    let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
-    let counts = counts(&journal);
-    let pairs = counts.windows(2).filter(|pair| pair[1].0 == pair[0].0 + 1);
-    let mut steps: Vec<u64> = pairs.map(|pair| pair[1].1 - pair[0].1).collect();
-    steps.dedup();
-    // Outputs that are held in a stall of this machine leave a pair out, and no other step in.
+    let counts = ended_well(child, &runs, &run);
+    let steps = steps(&counts);
     assert_eq!(steps, [1, 10, 1, 10], "{steps:?}");
-    let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
-    let summary: Value = serde_json::from_str(&summary).expect("JSON");
-    assert_eq!(summary["violation_count"], 0, "{summary:#}");
 }
 
 /// A new program that a fault stops in its eighth scan: it is taken back, the plant misses the cycle of the fault, and the change can be cancelled only.
@@ -180,8 +190,7 @@ fn a_program_fault_takes_a_change_back() {
     let after = write_cluster(&out.join("after"), &broken);
     let runs = out.join("runs");
     let more = ["--cycles", "100000", "--allow-commands"];
-    let (mut child, _errors) =
-        running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let (child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     let mut records = Records::of(&run);
     let run_text = run.to_str().expect("text");
@@ -216,19 +225,10 @@ fn a_program_fault_takes_a_change_back() {
     assert_eq!((exit, &document["failures"][0]["code"]), (1, &Value::from("U0632")));
     done("cancel");
     wait_for_alarm(false);
-    signal(child.id(), Signal::SIGINT);
-    child.wait().expect("it ends");
-    no_orphan(&runs);
-    let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
-    let counts = counts(&journal);
-    let pairs = counts.windows(2).filter(|pair| pair[1].0 == pair[0].0 + 1);
-    let mut steps: Vec<u64> = pairs.map(|pair| pair[1].1 - pair[0].1).collect();
-    steps.dedup();
+    let counts = ended_well(child, &runs, &run);
+    let steps = steps(&counts);
     assert_eq!(steps, [1, 10, 1], "{steps:?}");
     let around = counts.windows(2).find(|pair| pair[1].0 == pair[0].0 + 2);
     let around = around.expect("the fault costs a cycle");
     assert_eq!(around[1].1 - around[0].1, 1, "{around:?}");
-    let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
-    let summary: Value = serde_json::from_str(&summary).expect("JSON");
-    assert_eq!(summary["violation_count"], 0, "{summary:#}");
 }

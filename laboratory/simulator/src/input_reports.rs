@@ -14,7 +14,7 @@ const PATIENCE: u32 = 150;
 pub(crate) struct InputReports {
     /// Samples in a row.
     patience: u32,
-    /// In the order of the paired inputs.
+    /// What is known of each paired input, in the order of the settings.
     inputs: Vec<Watched>,
     partner_is_lost: bool,
     /// The remote I/O that has sampled last.

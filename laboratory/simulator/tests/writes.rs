@@ -60,6 +60,8 @@ END_PROGRAM";
 
 const PROGRAM: ProgramId = ProgramId(0);
 const READER_PROGRAM: ProgramId = ProgramId(1);
+/// The controllers and the understudy that the cluster has by itself.
+const STATIONS: [StationId; 3] = [StationId(0), StationId(1), StationId(2)];
 /// First bit of the signal of another group.
 const FAR: u16 = 32;
 /// First bits of the inputs.
@@ -111,7 +113,7 @@ struct Seen {
     /// y of the newest applied true output, by program.
     outputs: [Option<Image>; 2],
     cold_starts: u32,
-    /// Of the first program.
+    /// Warm starts of the first program.
     warm_starts: u32,
     /// What its questions and warm starts say of retained inputs.
     inputs: Vec<Option<OldInputs>>,
@@ -202,6 +204,19 @@ impl Bench {
 
     fn echo(&self) -> f32 {
         real_at(self.seen.outputs[0].as_ref().expect("applied"), 32)
+    }
+
+    /// All members fail and return.
+    fn power_fails(&mut self) {
+        let remote_ios = [PROGRAM, READER_PROGRAM].map(Member::RemoteIo);
+        for action in [Action::Crash, Action::Restart] {
+            for member in STATIONS.map(Member::Station).into_iter().chain(remote_ios) {
+                self.fault(member, action);
+            }
+            self.pass(60);
+            self.seen.outputs = [None, None];
+        }
+        self.pass(100);
     }
 
     fn fault(&mut self, member: Member, action: Action) {
@@ -342,25 +357,14 @@ fn an_input_keeps_its_value_over_a_power_failure() {
         text.replacen("controller = \"counter\"\n", &format!("controller = \"counter\"\n{line}"), 1)
     };
     let retentive = COUNTER.replace("VAR_OUTPUT", "VAR_OUTPUT RETAIN");
-    for (line, counter, warm) in
-        [("restart = \"cold\"\n", &retentive, false), ("", &retentive, true)]
-    {
-        let parts = cluster_of(&retains(line), counter);
+    for (line, warm) in [("restart = \"cold\"\n", false), ("", true)] {
+        let parts = cluster_of(&retains(line), &retentive);
         let mut bench = Bench::of(parts, Network::default(), 1);
         bench.write(&write(1, 1, VALUE, real(-3.0)));
         bench.write(&write(2, 1, PRESS, true.into()));
         bench.pass(8);
         assert_eq!((bench.count(), bench.echo()), (1.0, -3.0));
-        let stations = [0, 1, 2].map(StationId);
-        let remote_ios = [PROGRAM, READER_PROGRAM].map(Member::RemoteIo);
-        for action in [Action::Crash, Action::Restart] {
-            for member in stations.map(Member::Station).into_iter().chain(remote_ios) {
-                bench.fault(member, action);
-            }
-            bench.pass(60);
-            bench.seen.outputs = [None, None];
-        }
-        bench.pass(100);
+        bench.power_fails();
         let count = if warm { 1.0 } else { 0.0 };
         assert_eq!((bench.count(), bench.echo()), (count, -3.0), "{line}");
         // A write that is sent again has no second effect.
@@ -372,13 +376,13 @@ fn an_input_keeps_its_value_over_a_power_failure() {
             continue;
         }
         // The stations alone fail, with what they kept last: the remote I/O has the newest values.
-        // So many steps after the last whole state.
+        // The last whole state is older than the steps that are lost.
         bench.pass(4);
-        for station in stations {
+        for station in STATIONS {
             bench.fault(Member::Station(station), Action::Crash);
         }
         bench.pass(2);
-        for station in stations {
+        for station in STATIONS {
             bench.simulation.lose_steps(station, 4);
             bench.fault(Member::Station(station), Action::Restart);
         }
@@ -401,21 +405,10 @@ fn an_input_whose_value_is_lost_is_said() {
         let text = CLUSTER.replace("initial = 7.0", "initial = 7.0, retain = true");
         let retentive = COUNTER.replace("VAR_OUTPUT", "VAR_OUTPUT RETAIN");
         let mut bench = Bench::of(cluster_of(&text, &retentive), Network::default(), 1);
-        let restart = |bench: &mut Bench| {
-            let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
-            let remote_ios = [PROGRAM, READER_PROGRAM].map(Member::RemoteIo);
-            for action in [Action::Crash, Action::Restart] {
-                for member in stations.into_iter().chain(remote_ios) {
-                    bench.fault(member, action);
-                }
-                bench.pass(60);
-            }
-            bench.pass(100);
-        };
         bench.write(&write(1, 1, VALUE, real(-3.0)));
         bench.pass(8);
         if !is_lost {
-            restart(&mut bench);
+            bench.power_fails();
             assert_eq!((bench.seen.warm_starts, bench.seen.inputs.as_slice()), (1, &[None][..]));
             bench.simulation.write_protect(PROGRAM);
         }
@@ -427,7 +420,7 @@ fn an_input_whose_value_is_lost_is_said() {
             bench.simulation.write_protect(PROGRAM);
         }
         bench.seen.inputs.clear();
-        restart(&mut bench);
+        bench.power_fails();
         let choice = StateChoice::Newest { cycle: None };
         bench.fault(Member::RemoteIo(PROGRAM), Action::Choose { choice });
         bench.pass(60);
