@@ -328,9 +328,7 @@ fn no_spare(
         let is_unread = slot.is_some_and(|slot| slot.link.detached);
         reasons.push(match (known.state, &known.group) {
             _ if !serves.fits => format!("the group is too large for {name}"),
-            (SpareState::NotReceived, Some(at)) => {
-                format!("{name} has served {at}, and its station there is not received any more")
-            }
+            (SpareState::NotReceived, Some(at)) => failed_text(name, at),
             (SpareState::NotReceived, None) => format!("{name} is not received"),
             (SpareState::Waking, Some(at)) if *at == own.name => format!("{name} is waking"),
             (SpareState::Serving, Some(at)) if *at == own.name && is_unread => format!(
@@ -357,6 +355,11 @@ fn no_spare(
     reasons.join(", ")
 }
 
+/// A spare that has failed while it served a group.
+fn failed_text(name: &str, group: &str) -> String {
+    format!("{name} has served {group}, and its station there is not received any more")
+}
+
 fn alarms(groups: &[GroupOverview], spares: &[SpareOverview]) -> Vec<PlantAlarm> {
     let of_groups = groups.iter().filter_map(|group| {
         let GroupOverview { name, failed, reason, .. } = group;
@@ -380,9 +383,7 @@ fn alarms(groups: &[GroupOverview], spares: &[SpareOverview]) -> Vec<PlantAlarm>
         let name = &spare.name;
         let lost_in = spare.group.as_ref().filter(|_| spare.state == SpareState::NotReceived);
         let text = match (lost_in, spare.not_received_in.as_slice()) {
-            (Some(group), _) => {
-                format!("{name} has served {group}, and its station there is not received any more")
-            }
+            (Some(group), _) => failed_text(name, group),
             (None, _) if spare.state == SpareState::NotReceived => {
                 format!("{name} is not received by any group: it may not wake")
             }

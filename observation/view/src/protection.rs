@@ -90,10 +90,9 @@ impl LostState {
     /// What is available, and how old it is.
     pub fn text(&self) -> String {
         let age = self.age_cycles.map_or_else(String::new, |age| format!(", {age} cycles old"));
-        let doubt = match self.age_cycles {
-            _ if self.reason.is_some() => "",
-            Some(_) => "",
-            None => "; whether outputs of a newer one were applied is not known",
+        let doubt = match (self.age_cycles, self.reason) {
+            (None, None) => "; whether outputs of a newer one were applied is not known",
+            _ => "",
         };
         let since = self.since;
         let lost = match self.reason {

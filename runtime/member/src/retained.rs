@@ -7,6 +7,7 @@ use understudy_cluster::{Cluster, Code, Security, read_kept};
 use understudy_executable::Scratch;
 use understudy_keys::authority_of;
 use understudy_node::Settings;
+use understudy_remote_io::OperatorInput;
 use understudy_typed::{CarriedState, Fate};
 use understudy_wire::{
     Carried, Digest, Image, Moment, ProgramHash, ProgramId, RetainedProgram, RetainedRun,
@@ -117,9 +118,11 @@ pub(crate) fn retained_notes(
     let hash = settings.hash;
     let inputs = code.interface().inputs;
     let input_at = |bit: u16| inputs.iter().find(|point| point.bit == u32::from(bit));
-    let retained = settings.operator_inputs.iter().filter(|input| input.retains);
-    let retained = retained.filter_map(|input| Some(input_at(input.place.bit)?.name.clone()));
-    let retained: Vec<String> = retained.collect();
+    let retained_where = |is_wanted: &dyn Fn(&OperatorInput) -> bool| -> Vec<String> {
+        let wanted = settings.operator_inputs.iter().filter(|it| it.retains && is_wanted(it));
+        wanted.filter_map(|input| Some(input_at(input.place.bit)?.name.clone())).collect()
+    };
+    let retained = retained_where(&|_| true);
     let kept = RetainedProgram { inputs: retained.clone(), ..code.source().kept(hash) };
     let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name()));
     let files = files.with_program(kept).with_authority(owner.authority);
@@ -135,13 +138,8 @@ pub(crate) fn retained_notes(
         // The file has the name of this remote I/O: with other controllers before it, its program had another number.
         note.recalled.program = program;
     }
-    let mut carried = CarriedOver {
-        program: cluster.controllers()[program.index()].name.clone(),
-        kept: 0,
-        converted: 0,
-        new: 0,
-        dropped: Vec::new(),
-    };
+    let controller = cluster.controllers()[program.index()].name.clone();
+    let mut carried = CarriedOver { program: controller, ..CarriedOver::default() };
     if let Some(note) =
         notes.newest.as_mut().filter(|note| note.hash != hash && !is_loaded(program, note.hash))
     {
@@ -181,16 +179,9 @@ pub(crate) fn retained_notes(
             }
         }
     }
-    if let Some(note) = notes
-        .newest
-        .as_ref()
-        .filter(|note| note.recalled.inputs.width() == settings.undriven.width())
-    {
-        let is_outside = |input: &&understudy_remote_io::OperatorInput| {
-            input.retains && !input.admits(input.place.get(&note.recalled.inputs))
-        };
-        let outside = settings.operator_inputs.iter().filter(is_outside);
-        let outside = outside.filter_map(|input| Some(input_at(input.place.bit)?.name.clone()));
+    let noted = notes.newest.as_ref().map(|note| &note.recalled.inputs);
+    if let Some(noted) = noted.filter(|noted| noted.width() == settings.undriven.width()) {
+        let outside = retained_where(&|input| !input.admits(input.place.get(noted)));
         carried.dropped.extend(outside);
     }
     let is_told = carried.kept + carried.new + carried.dropped.len() > 0;

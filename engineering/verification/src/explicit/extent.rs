@@ -20,7 +20,7 @@ impl Extent {
         Self { steady: self.any.max(states), ..self }
     }
 
-    /// The bound where so many states are known.
+    /// The bound on the states, while `known` of them are known.
     pub(super) fn bound(self, known: usize, depths: &Depths) -> usize {
         if known > self.any && depths.are_steady() { self.steady } else { self.any }
     }

@@ -91,8 +91,7 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     );
     StateLost { applied, newest, holder, asks, reason, inputs, .. } => "state-lost" Alarm {
         let newest = newest.zip(*holder).map(|(newest, holder)| (newest, name(holder, members)));
-        let text = state_lost_text(*applied, newest, *asks, *reason);
-        inputs.map_or_else(|| text.clone(), |inputs| format!("{text}; after accept-state {}", old_inputs_text(inputs)))
+        state_lost_text(*applied, newest, *asks, (*reason, *inputs))
     };
     StateRecovered { from, .. } => "state-recovered" Notice
         format!("{} has returned with the state of its program", name(*from, members));
@@ -249,7 +248,7 @@ fn state_lost_text(
     applied: Option<Moment>,
     newest: Option<(Moment, &str)>,
     asks: bool,
-    reason: AskReason,
+    (reason, inputs): (AskReason, Option<OldInputs>),
 ) -> String {
     let behind = applied.map_or_else(
         || "it is not known whether newer outputs were applied".to_owned(),
@@ -277,11 +276,13 @@ fn state_lost_text(
         None => "no station has one that can be used, and".to_owned(),
     };
     let lost = match asked_because(reason) {
-        None => "the state of its program is lost".to_owned(),
-        Some(reason) => format!("its program does not start by itself: {reason}"),
+        None => "the state of its program is lost:".to_owned(),
+        Some(reason) => format!("its program does not start by itself: {reason};"),
     };
-    let separator = if reason == AskReason::Doubt { ":" } else { ";" };
-    format!("{lost}{separator} {available} {behind}; {next}")
+    let inputs = inputs.map_or_else(String::new, |inputs| {
+        format!("; after accept-state {}", old_inputs_text(inputs))
+    });
+    format!("{lost} {available} {behind}; {next}{inputs}")
 }
 
 fn value_fault_text(
