@@ -13,7 +13,7 @@ use oxidd::bdd::{BDDFunction, BDDManagerRef, new_manager};
 use oxidd::util::{AllocResult, OptBool, SatCountCache};
 use oxidd::{
     BooleanFunction, BooleanFunctionQuant, Function, FunctionSubst, HasWorkers, Manager,
-    ManagerRef, Subst, VarNo, WorkerPool,
+    ManagerRef, Subst, Substitution as _, VarNo, WorkerPool,
 };
 
 use crate::expression::{Expression, Graph, Operation, Variable};
@@ -21,6 +21,8 @@ use reorder::Need;
 
 /// So many variables are no danger to an ordinary stack.
 const SHALLOW: usize = 500;
+
+type Nodes<'id> = <BDDFunction as Function>::Manager<'id>;
 
 /// Why a diagram could not be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -157,27 +159,39 @@ impl Diagrams {
     /// It is not declared, or there is no node left.
     pub fn variable(&self, variable: Variable) -> Result<Diagram, BddError> {
         let number = *self.numbers.get(&variable).ok_or(BddError::UnknownVariable(variable))?;
-        self.made(|| self.manager.with_manager_shared(|manager| BDDFunction::var(manager, number)))
+        self.made(|nodes| Ok(BDDFunction::from_edge(nodes, BDDFunction::var_edge(nodes, number)?)))
     }
 
     /// Negation.
     pub fn not(&self, operand: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|| operand.0.not())
+        self.made(|nodes| {
+            let made = BDDFunction::not_edge(nodes, operand.0.as_edge(nodes))?;
+            Ok(BDDFunction::from_edge(nodes, made))
+        })
     }
 
     /// Logical product.
     pub fn and(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|| left.0.and(&right.0))
+        self.made(|nodes| {
+            let made = BDDFunction::and_edge(nodes, left.0.as_edge(nodes), right.0.as_edge(nodes))?;
+            Ok(BDDFunction::from_edge(nodes, made))
+        })
     }
 
     /// Logical sum.
     pub fn or(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|| left.0.or(&right.0))
+        self.made(|nodes| {
+            let made = BDDFunction::or_edge(nodes, left.0.as_edge(nodes), right.0.as_edge(nodes))?;
+            Ok(BDDFunction::from_edge(nodes, made))
+        })
     }
 
     /// Exclusive or.
     pub fn xor(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|| left.0.xor(&right.0))
+        self.made(|nodes| {
+            let made = BDDFunction::xor_edge(nodes, left.0.as_edge(nodes), right.0.as_edge(nodes))?;
+            Ok(BDDFunction::from_edge(nodes, made))
+        })
     }
 
     /// `one` where `condition` holds, `zero` elsewhere.
@@ -190,7 +204,11 @@ impl Diagrams {
         one: &Diagram,
         zero: &Diagram,
     ) -> Result<Diagram, BddError> {
-        self.made(|| condition.0.ite(&one.0, &zero.0))
+        self.made(|nodes| {
+            let [condition, one, zero] = [condition, one, zero].map(|one| one.0.as_edge(nodes));
+            let made = BDDFunction::ite_edge(nodes, condition, one, zero)?;
+            Ok(BDDFunction::from_edge(nodes, made))
+        })
     }
 
     /// Whether the function is 1 for some value of each variable of the product `variables`.
@@ -198,7 +216,14 @@ impl Diagrams {
     /// # Errors
     /// Too many nodes.
     pub fn exists(&self, diagram: &Diagram, variables: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|| diagram.0.exists(&variables.0))
+        self.made(|nodes| {
+            let made = BDDFunction::exists_edge(
+                nodes,
+                diagram.0.as_edge(nodes),
+                variables.0.as_edge(nodes),
+            )?;
+            Ok(BDDFunction::from_edge(nodes, made))
+        })
     }
 
     /// The product of declared variables, for [`Self::exists`].
@@ -244,7 +269,11 @@ impl Diagrams {
     ) -> Result<Diagram, BddError> {
         match &substitution.0 {
             None => Ok(diagram.clone()),
-            Some(pairs) => self.made(|| diagram.0.substitute(pairs)),
+            Some(pairs) => self.made(|nodes| {
+                let pairs = pairs.map(|(variable, one)| (variable, one.as_edge(nodes)));
+                let made = BDDFunction::substitute_edge(nodes, diagram.0.as_edge(nodes), pairs)?;
+                Ok(BDDFunction::from_edge(nodes, made))
+            }),
         }
     }
 
@@ -323,21 +352,33 @@ impl Diagrams {
     /// What `operation` makes; where it finds no free node, once more without the dead ones, or in a better order if it may change.
     fn made(
         &self,
-        operation: impl Fn() -> AllocResult<BDDFunction> + Sync,
+        operation: impl for<'id> Fn(&Nodes<'id>) -> AllocResult<BDDFunction> + Sync,
     ) -> Result<Diagram, BddError> {
-        let mut made = self.deep(&operation);
+        let mut made = self.operate(&operation);
         if let Some(need) = &self.need {
             if made.is_ok() {
                 if !need.look(&self.manager) {
                     return Err(BddError::TooManyNodes { limit: self.limit });
                 }
             } else if need.make_room(&self.manager) {
-                made = self.deep(&operation);
+                made = self.operate(&operation);
             }
         } else if made.is_err() && self.makes_room() {
-            made = self.deep(&operation);
+            made = self.operate(&operation);
         }
         made.map(Diagram).map_err(|_| BddError::TooManyNodes { limit: self.limit })
+    }
+
+    /// Alone with the diagrams, so that the library's own collection of dead nodes waits: in the middle of an operation it would clear the cache of what
+    /// was worked out, again and again near the bound, and the operation would begin again and again. On the deep stack somebody else may be at work.
+    fn operate(
+        &self,
+        operation: &(impl for<'id> Fn(&Nodes<'id>) -> AllocResult<BDDFunction> + Sync),
+    ) -> AllocResult<BDDFunction> {
+        if self.variables.len() <= SHALLOW {
+            return self.manager.with_manager_exclusive(|nodes| operation(nodes));
+        }
+        self.manager.with_manager_shared(|nodes| nodes.workers().install(|| operation(nodes)))
     }
 
     /// Nodes of all diagrams, with those of no use that were not removed yet.

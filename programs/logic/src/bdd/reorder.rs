@@ -11,8 +11,9 @@ use oxidd::{HasLevel, LevelNo, Manager, ManagerRef, VarNo};
 use oxidd_core::LevelView;
 use oxidd_reorder::set_var_order_seq;
 
-/// Times the living nodes: what one reordering may move.
+/// Times the living nodes: what one reordering may move, and at most, some seconds: nothing ends it earlier.
 const MOVES: usize = 40;
+const MOST_MOVES: usize = 1 << 24;
 
 /// Variables that one reordering moves, those with the most nodes.
 const VARIABLES: usize = 500;
@@ -139,7 +140,7 @@ where
     }
 
     fn run(mut self) {
-        self.moves = MOVES * self.total;
+        self.moves = (MOVES * self.total).min(MOST_MOVES);
         let mut largest: Vec<(usize, VarNo)> =
             self.sizes.iter().copied().zip(self.order.iter().copied()).collect();
         largest.sort_unstable_by_key(|&(size, variable)| (std::cmp::Reverse(size), variable));
