@@ -156,7 +156,7 @@ pub(crate) fn missing_text(missing: Missing) -> &'static str {
         Missing::TooLate => "the host woke the remote I/O more than a period after the deadline",
         Missing::BadQuality => "the sensors cannot be read",
         Missing::NoHistory => "the remote I/O does not know its program's history yet",
-        Missing::StateLost => "no living station can prove the program's state",
+        Missing::StateLost => "it is open from which state the program starts",
         Missing::NotReleased => "the operator has to release the outputs",
         Missing::ValueFault => "stations disagree and no majority exists",
         Missing::ProgramFault => "a program fault has stopped the program",

@@ -361,7 +361,7 @@ impl Snapshot {
                     "not known: {name} has reported nothing for {cycles} cycles ({seconds:.1} s)"
                 )
             }
-            (None, None) => "not reported yet".to_owned(),
+            (None, None) => format!("{} has not reported it yet", program.remote_io),
         }
     }
 }

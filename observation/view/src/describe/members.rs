@@ -1,5 +1,7 @@
 //! Events of stations, remote I/Os and plants.
 
+use std::cmp::Ordering;
+
 use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
@@ -253,9 +255,12 @@ fn state_lost_text(
     let behind = applied.map_or_else(
         || "it is not known whether newer outputs were applied".to_owned(),
         |applied| {
-            let is_other = newest.is_some_and(|(newest, _)| newest.epoch != applied.epoch);
             // Cycles of two starts are no age.
-            let start = if is_other { ", counted from another start of the cluster," } else { "" };
+            let start = match newest.map(|(newest, _)| applied.epoch.cmp(&newest.epoch)) {
+                Some(Ordering::Less) => " of an earlier start of the cluster",
+                Some(Ordering::Greater) => " of a later start of the cluster",
+                Some(Ordering::Equal) | None => "",
+            };
             format!("outputs of cycle {}{start} were applied", applied.cycle.0)
         },
     );

@@ -202,7 +202,7 @@ fn nothing_that_is_not_observed_counts_as_protected() {
     check(
         [calm("line-1"), GroupView::Present(silent)],
         (SpareState::Asleep, None),
-        &["line-2 is not observed: protection of press: not reported yet"],
+        &["line-2 is not observed: protection of press: press-io has not reported it yet"],
     );
     let overview = PlantOverview::new(&plant(""), &[unknown(), unknown()]);
     assert!(overview.groups.iter().all(|group| group.state == GroupState::NotObserved));
