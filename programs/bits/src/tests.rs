@@ -127,7 +127,7 @@ fn compare_with(program: &Program, system: &System, seed: u64, scans: usize) -> 
     faulted
 }
 
-const PROGRAMS: [&str; 10] = [
+const PROGRAMS: [&str; 11] = [
     // Inputs with subranges, of all widths and signs; one is compared with what it never is.
     "PROGRAM p
        VAR_INPUT a : INT (10..100); b : SINT (-7..-2); c : LINT (-5..5000000000); d : USINT (3..3); e : WORD; END_VAR
@@ -190,6 +190,17 @@ const PROGRAMS: [&str; 10] = [
        y := c.left / t[3].left + t[4].left;
        r := t[3].right;
        f := c.flags[2] OR t[3].flags[1];
+     END_PROGRAM",
+    // Remainders by what may be 0, which are 0 then and no fault; quotients by what is not.
+    "PROGRAM p
+       VAR_INPUT a : SINT; b : SINT; c : USINT; d : USINT; e : INT; f : INT (-2..2); g : BYTE; END_VAR
+       VAR_OUTPUT v : SINT; w : USINT; x : INT; y : SINT; z : USINT; zero : BOOL; END_VAR
+       v := a MOD b;
+       w := c MOD d;
+       x := e MOD f;
+       y := SEL(b = 0, a, 7) / SEL(b = 0, b, SINT#1);
+       z := BYTE_TO_USINT(g) MOD (d MOD 3);
+       zero := a MOD b = 0 AND b = 0 AND a <> 0;
      END_PROGRAM",
     // Blocks, references, reals that are kept.
     include_str!("tests/blocks.st"),

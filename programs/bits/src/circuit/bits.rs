@@ -333,7 +333,12 @@ impl Pass<'_> {
                 let (whole, rest) = quotient(graph, &one, &other, is_signed);
                 let result = match operation {
                     O::Divide(_) => Number { bits: whole, unit: 1, is_signed },
-                    _ => Number { bits: rest, unit, is_signed },
+                    // A remainder by 0 is 0.
+                    _ => {
+                        let divides = graph.any(other.iter().copied());
+                        let bits = rest.into_iter().map(|bit| graph.and(bit, divides)).collect();
+                        Number { bits, unit, is_signed }
+                    }
                 };
                 return Some(result.coded(graph, coding));
             }

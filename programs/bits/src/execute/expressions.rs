@@ -105,7 +105,8 @@ impl Execution<'_> {
             }
         }
         match operation {
-            Operation::Divide(kind) | Operation::Modulo(kind) if !kind.is_real() => {
+            // A remainder by 0 is 0.
+            Operation::Divide(kind) if !kind.is_real() => {
                 let zero = self.terms.equals(numbers[1], 0);
                 self.fault(zero);
             }
