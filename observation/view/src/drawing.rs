@@ -193,7 +193,7 @@ impl<'t> Scan<'t> {
 /// The one assignment of an address, with its value.
 fn assignment<'t>(done: &[&'t Done], address: u64) -> Option<(&'t Done, Elementary, u64)> {
     let mut found = done.iter().filter_map(|done| match done.effect {
-        Effect::Assigned { address: at, value: Some((of, value)) } if at == address => {
+        Effect::Assigned { address: at, value: Some((of, value)), .. } if at == address => {
             Some((*done, of, value))
         }
         _ => None,

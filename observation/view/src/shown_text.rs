@@ -122,7 +122,7 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         }
         executed.insert(done.line);
         // A variable of a frame has no name but in the text.
-        if let Effect::Assigned { address, value: Some((of, stored)) } = done.effect
+        if let Effect::Assigned { address, value: Some((of, stored)), .. } = done.effect
             && address / 64 >= u64::from(typed.state)
             && let Some((target, _)) = source.line(done.line).and_then(|it| it.split_once(":="))
         {

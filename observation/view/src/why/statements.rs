@@ -73,7 +73,9 @@ impl<'m> Explainer<'m> {
             return Ok(input);
         }
         match trace.last_write(part.address) {
-            Some(write) => Ok(self.written(&part.name, &trace, write, place, 0)),
+            Some(write) => {
+                Ok(self.written((&part.name, part.address, stored), &trace, write, place, 0))
+            }
             None => {
                 let mut kept = self.kept(part, stored, place, 0);
                 if let Some((routine, line)) = self.writer_of(part, place) {
@@ -157,20 +159,27 @@ impl<'m> Explainer<'m> {
             self.locate(&mut reason, routine, fault.line);
         }
         reason.because = match self.not_finite(&fault, &trace) {
-            Some((output, write)) => vec![self.written(&output, &trace, write, at, 0)],
+            Some((output, address, stored, write)) => {
+                vec![self.written((&output, address, Some(stored)), &trace, write, at, 0)]
+            }
             None => self.reads(&last_reads(&trace.failed), &trace, at, 0, None),
         };
         Some(reason)
     }
 
     /// The output that is not a finite number, and the statement that assigned it.
-    fn not_finite(&self, fault: &Fault, trace: &Trace) -> Option<(String, usize)> {
-        let Cause::OutputNotFinite { output, .. } = fault.cause else {
+    fn not_finite(
+        &self,
+        fault: &Fault,
+        trace: &Trace,
+    ) -> Option<(String, u64, (Elementary, u64), usize)> {
+        let Cause::OutputNotFinite { output, value } = fault.cause else {
             return None;
         };
         let point = self.program.outputs.iter().nth(output as usize)?;
-        let write = trace.last_write(64 * u64::from(point.slot))?;
-        Some((point.name.clone(), write))
+        let address = 64 * u64::from(point.slot);
+        let write = trace.last_write(address)?;
+        Some((point.name.clone(), address, (point.of, value), write))
     }
 
     fn trace(&mut self, place: usize) -> Option<Rc<Trace>> {
@@ -213,10 +222,10 @@ impl<'m> Explainer<'m> {
         }
     }
 
-    /// A value that a statement of the scan at `place` assigned.
+    /// A value that a statement of the scan at `place` assigned to the variable of a name and an address, alone or with the whole that it is a part of.
     fn written(
         &mut self,
-        name: &str,
+        (name, address, stored): (&str, u64, Stored),
         trace: &Rc<Trace>,
         write: usize,
         place: usize,
@@ -224,7 +233,8 @@ impl<'m> Explainer<'m> {
     ) -> Reason {
         let done = &trace.done[write];
         let stored = match done.effect {
-            Effect::Assigned { value, .. } => value,
+            Effect::Assigned { value: Some(value), .. } => Some(value),
+            Effect::Assigned { value: None, .. } => stored,
             Effect::Chose => None,
         };
         let mut reason = self.leaf(name, stored, place, "assigned");
@@ -233,7 +243,9 @@ impl<'m> Explainer<'m> {
             reason.text += OMITTED;
             return reason;
         }
-        reason.because = self.reads(&done.reads, trace, place, depth, None);
+        let copied = stored.and_then(|stored| trace.copied(write, address, stored));
+        let reads: Vec<Read> = done.reads.iter().copied().chain(copied).collect();
+        reason.because = self.reads(&reads, trace, place, depth, None);
         let mut under = done.under;
         while let Some(choice) = under.map(|choice| &trace.done[choice]) {
             let read = self.reads(&choice.reads, trace, place, depth, Some(choice));
@@ -305,12 +317,14 @@ impl<'m> Explainer<'m> {
                 let name = part.map_or("temporary".to_owned(), |part| part.name);
                 self.leaf(&name, stored, place, "assigned by a later turn of a loop")
             }
-            (Some(write), Some(part)) => self.written(&part.name, trace, write, place, depth),
+            (Some(write), Some(part)) => {
+                self.written((&part.name, part.address, stored), trace, write, place, depth)
+            }
             (Some(write), None) => {
                 let line = self.text.line(trace.done[write].line);
                 let target = line.and_then(|line| line.split_once(":="));
                 let name = target.map_or("temporary", |(target, _)| target.trim());
-                self.written(name, trace, write, place, depth)
+                self.written((name, read.address, stored), trace, write, place, depth)
             }
             (None, Some(part)) => self.kept(&part, stored, place, depth),
             (None, None) => self.leaf("temporary", stored, place, "its initial value in this call"),
@@ -386,10 +400,12 @@ impl<'m> Explainer<'m> {
             format!("assigned in cycle {when}, and kept since")
         };
         let mut reason = self.leaf(&part.name, value, place, kept);
+        let stored_after = part.stored(&trace.memory);
         let done = &trace.done[write];
         self.locate(&mut reason, done.routine, done.line);
         if is_followed {
-            reason.because = self.written(&part.name, &trace, write, writer, depth + 1).because;
+            let written = (part.name.as_str(), part.address, stored_after);
+            reason.because = self.written(written, &trace, write, writer, depth + 1).because;
         }
         reason
     }

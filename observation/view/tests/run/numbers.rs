@@ -299,3 +299,65 @@ fn the_conditions_that_were_false_explain_a_default() {
     assert_eq!((other.line, other.cycle), (Some(15), 90), "{kept:#?}");
     assert_eq!(other.because[0].signal, "n", "{kept:#?}");
 }
+
+/// Copies arrays and structures as wholes, on the way to its outputs and into variables that it keeps.
+const COPIES: &str = "\
+TYPE pair : STRUCT left : INT; on : BOOL; END_STRUCT; END_TYPE
+FUNCTION_BLOCK keeper
+  VAR_INPUT given : pair; END_VAR
+  VAR_OUTPUT kept : pair; END_VAR
+  kept := given;
+END_FUNCTION_BLOCK
+PROGRAM feed
+  VAR_INPUT speed : INT; run : BOOL; END_VAR
+  VAR_OUTPUT share : INT; rate : REAL; busy : BOOL; END_VAR
+  VAR n : INT; first, second, early : pair; one, other : ARRAY[0..2] OF INT; keep : keeper; END_VAR
+  n := n + 1;
+  first.left := speed * 2;
+  first.on := run;
+  keep(given := first, kept => second);
+  one[1] := second.left + 1;
+  other := one;
+  IF n = 5 THEN
+    early := second;
+  END_IF;
+  share := other[1];
+  busy := second.on AND early.on;
+END_PROGRAM
+";
+
+#[test]
+fn a_part_of_what_was_copied_as_a_whole_is_explained() {
+    let model = seen(&cluster_of(COPIES, BELT), "title = \"copies\"\ncycles = 40\n");
+    let why = |signal: &str| {
+        let why = model.why(signal, Some(30)).expect("known");
+        let because = why.because.expect("a reason");
+        assert_eq!(why.value, because.value, "{because:#?}");
+        because
+    };
+    let share = why("feed.share");
+    // Each name on the way from the input, its value, and the line that assigned it.
+    let way = [
+        ("share", 61, Some(20)),
+        ("other[1]", 61, Some(16)),
+        ("one[1]", 61, Some(15)),
+        ("second.left", 60, Some(14)),
+        ("keep.kept.left", 60, Some(5)),
+        ("keep.given.left", 60, Some(14)),
+        ("first.left", 60, Some(12)),
+        ("speed", 30, None),
+    ];
+    let mut at = &share;
+    for (signal, value, line) in way {
+        at = find(at, signal).unwrap_or_else(|| panic!("{signal} in {share:#?}"));
+        assert_eq!((&at.value, at.line), (&json!(value), line), "{at:#?}");
+    }
+    assert_eq!(why("feed.second.on").value, json!(true));
+    // Never assigned alone, and kept since the scan that copied it.
+    let early = why("feed.early.left");
+    assert_eq!(early.value, json!(60));
+    assert!(early.text.contains("and kept since"), "{early:#?}");
+    assert!(find(&early, "speed").is_some(), "{early:#?}");
+    // Not assigned at all but within its whole.
+    assert_eq!(why("feed.other[0]").because[0].text, "its initial value");
+}

@@ -25,6 +25,13 @@ pub struct Read {
     pub by: Option<usize>,
 }
 
+/// An array or a structure that a statement read as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Whole {
+    address: u64,
+    slots: u64,
+}
+
 /// What an operation of a statement came to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Made {
@@ -40,6 +47,7 @@ pub struct Made {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Mark {
     reads: usize,
+    wholes: usize,
     results: usize,
 }
 
@@ -50,11 +58,26 @@ pub enum Effect {
     Assigned {
         /// Its place in memory: 64 · slot + bit.
         address: u64,
+        /// Its slots.
+        slots: u64,
         /// Type and value, of a variable without parts.
         value: Option<(Elementary, u64)>,
     },
     /// It chose what is executed, by a condition or a selector.
     Chose,
+}
+
+impl Effect {
+    /// Whether it assigned the variable at an address, alone or with the whole that it is a part of.
+    fn assigned(self, part: u64) -> bool {
+        match self {
+            Self::Assigned { address, value: Some(_), .. } => address == part,
+            Self::Assigned { address, slots, value: None } => {
+                (address..address + 64 * slots).contains(&part)
+            }
+            Self::Chose => false,
+        }
+    }
 }
 
 /// A statement that was executed.
@@ -68,6 +91,8 @@ pub struct Done {
     pub effect: Effect,
     /// What it read, in order.
     pub reads: Vec<Read>,
+    /// The arrays and structures that it read as wholes, in order.
+    wholes: Vec<Whole>,
     /// What its operations came to, in order.
     pub results: Vec<Made>,
     /// The choice that led to it, as a place in [`Trace::done`].
@@ -90,11 +115,28 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// The last statement that assigned the variable at an address.
+    /// The last statement that assigned the variable at an address, alone or with the whole that it is a part of.
     pub fn last_write(&self, address: u64) -> Option<usize> {
-        self.done.iter().rposition(
-            |done| matches!(done.effect, Effect::Assigned { address: of, .. } if of == address),
-        )
+        self.last_write_before(self.done.len(), address)
+    }
+
+    fn last_write_before(&self, end: usize, address: u64) -> Option<usize> {
+        self.done[..end].iter().rposition(|done| done.effect.assigned(address))
+    }
+
+    /// Where a part of an array or a structure has its value from that a statement copied as a whole; nothing where it copied none, or chose among several.
+    pub fn copied(&self, write: usize, part: u64, (of, value): (Elementary, u64)) -> Option<Read> {
+        let done = &self.done[write];
+        let Effect::Assigned { address: to, slots, value: None } = done.effect else {
+            return None;
+        };
+        match *done.wholes {
+            [from] if from.slots == slots => {
+                let address = from.address + part.checked_sub(to)?;
+                Some(Read { address, of, value, by: self.last_write_before(write, address) })
+            }
+            _ => None,
+        }
     }
 }
 
@@ -103,15 +145,19 @@ impl Trace {
 pub(super) struct Recorder {
     trace: Trace,
     reads: Vec<Read>,
+    wholes: Vec<Whole>,
     results: Vec<Made>,
-    /// The newest assignment of each address.
+    /// The newest assignment of each variable without parts, by its address.
     writers: BTreeMap<u64, usize>,
+    /// That of each array and structure that was assigned as a whole, with its slots.
+    whole_writers: BTreeMap<u64, (u64, usize)>,
     under: Option<usize>,
 }
 
 impl Recorder {
     fn push(&mut self, context: Context, line: u32, effect: Effect, mark: Mark) -> Option<usize> {
         let reads = self.reads.split_off(mark.reads.min(self.reads.len()));
+        let wholes = self.wholes.split_off(mark.wholes.min(self.wholes.len()));
         let results = self.results.split_off(mark.results.min(self.results.len()));
         if self.trace.done.len() == MOST {
             self.trace.is_cut = true;
@@ -122,10 +168,19 @@ impl Recorder {
             line,
             effect,
             reads,
+            wholes,
             results,
             under: self.under,
         });
         Some(self.trace.done.len() - 1)
+    }
+
+    /// The newest assignment of a variable, alone or with the whole that it is a part of.
+    fn writer(&self, address: u64) -> Option<usize> {
+        let wholes = self.whole_writers.range(..=address);
+        let wholes = wholes.filter(|(first, (slots, _))| address < **first + 64 * slots);
+        let whole = wholes.map(|(_, (_, place))| *place).max();
+        self.writers.get(&address).copied().max(whole)
     }
 }
 
@@ -159,6 +214,7 @@ impl Run<'_> {
         let recorder = self.trace.as_ref();
         recorder.map_or(Mark::default(), |recorder| Mark {
             reads: recorder.reads.len(),
+            wholes: recorder.wholes.len(),
             results: recorder.results.len(),
         })
     }
@@ -175,10 +231,16 @@ impl Run<'_> {
 
     /// A value is read.
     pub(super) fn loaded(&mut self, Address(address): Address, of: &Type) {
-        if let (Some(recorder), Some(of)) = (&mut self.trace, of.elementary()) {
-            let value = self.memory.get(Address(address), of);
-            let by = recorder.writers.get(&address).copied();
-            recorder.reads.push(Read { address, of, value, by });
+        let Some(recorder) = &mut self.trace else {
+            return;
+        };
+        match of.elementary() {
+            Some(of) => {
+                let value = self.memory.get(Address(address), of);
+                let by = recorder.writer(address);
+                recorder.reads.push(Read { address, of, value, by });
+            }
+            None => recorder.wholes.push(Whole { address, slots: of.slots() }),
         }
     }
 
@@ -195,17 +257,15 @@ impl Run<'_> {
             return;
         };
         let value = of.elementary().map(|of| (of, self.memory.get(Address(address), of)));
-        let effect = Effect::Assigned { address, value };
+        let slots = of.slots();
+        let effect = Effect::Assigned { address, slots, value };
         let Some(place) = recorder.push(context, line, effect, reads) else {
             return;
         };
-        recorder.writers.insert(address, place);
-        if value.is_none() {
-            // The parts of an array or a structure that were assigned before have their values from here.
-            let behind = address + 64 * of.slots();
-            let parts = recorder.writers.range_mut(address..behind);
-            parts.for_each(|(_, by)| *by = place);
-        }
+        match value {
+            Some(_) => recorder.writers.insert(address, place).map(drop),
+            None => recorder.whole_writers.insert(address, (slots, place)).map(drop),
+        };
     }
 
     /// Executes the statements that a condition, read since `reads`, has chosen.
@@ -233,9 +293,8 @@ impl Run<'_> {
     pub(super) fn forget(&mut self, first: usize, count: usize) {
         if let Some(recorder) = &mut self.trace {
             let (from, to) = (64 * first as u64, 64 * (first + count) as u64);
-            while let Some((&address, _)) = recorder.writers.range(from..to).next() {
-                recorder.writers.remove(&address);
-            }
+            recorder.writers.retain(|address, _| !(from..to).contains(address));
+            recorder.whole_writers.retain(|address, _| !(from..to).contains(address));
         }
     }
 }
