@@ -1,5 +1,6 @@
 //! `understudy scan`: the outputs of a program, scan by scan, for inputs from a file.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -23,9 +24,10 @@ Example:
   understudy scan --json examples/press-cell/robot.ladder --inputs examples/press-cell/part-arrives.txt
   understudy scan examples/heated-tank/level.st --digest 100000
 
-A line of the file holds the values of all inputs in the order of their declaration, with blanks between: BOOL as 0 or 1, integers and bit
-strings in decimal, REAL and LREAL as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds.
-Empty lines and lines that begin with # are skipped. Each scan is printed as `inputs -> outputs` in the same notation.
+A line of the file holds the values of all inputs, with blanks between: BOOL as 0 or 1, integers and bit strings in decimal, REAL and LREAL
+as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds. A line `# NAME NAME ...` with the
+names of all inputs gives the order of the values below it; without one it is that of the list `inputs` of --json: inputs at addresses and
+global ones first, then as they are declared. Empty lines and other lines that begin with # are skipped. Each scan is printed as `inputs -> outputs` in the same notation.
 With --digest, the inputs are pseudo-random and the same in every run. The digest of all outputs is equal on every processor and in every
 version of Understudy that executes the program alike.")]
 pub(crate) struct Arguments {
@@ -147,6 +149,8 @@ pub(crate) fn subject(
 /// The stored values of each scan.
 fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<Diagnostic>> {
     let points: Vec<&Point> = declared(inputs).collect();
+    // Which input each column of the file is.
+    let mut columns: Vec<usize> = (0..points.len()).collect();
     let mut scans = Vec::new();
     let mut diagnostics = Vec::new();
     let mut place = 0;
@@ -154,7 +158,11 @@ fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<
         let start = place;
         place += line.len();
         let line = line.trim_end();
-        if line.trim_start().starts_with('#') || line.trim().is_empty() && !points.is_empty() {
+        if let Some(comment) = line.trim_start().strip_prefix('#') {
+            columns = named_columns(comment, &points).unwrap_or(columns);
+            continue;
+        }
+        if line.trim().is_empty() && !points.is_empty() {
             continue;
         }
         if scans.len() >= MAXIMUM_SCANS || diagnostics.len() >= MAXIMUM_REPORTED {
@@ -162,7 +170,7 @@ fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<
             diagnostics.push(Diagnostic::too_many(start));
             break;
         }
-        match values(line, start, &points) {
+        match values(line, start, &points, &columns) {
             Ok(values) => scans.push(values),
             Err(found) => diagnostics.extend(found),
         }
@@ -173,10 +181,21 @@ fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<
     Ok(scans)
 }
 
+/// Which input each word of a comment is, where they are the names of all inputs; outputs may stand behind an arrow.
+fn named_columns(comment: &str, points: &[&Point]) -> Option<Vec<usize>> {
+    let words = comment.split("->").next().unwrap_or_default().split_whitespace();
+    let place = |word: &str| points.iter().position(|it| it.name.eq_ignore_ascii_case(word));
+    let columns: Vec<usize> = words.map(place).collect::<Option<_>>()?;
+    let different: BTreeSet<usize> = columns.iter().copied().collect();
+    (columns.len() == points.len() && different.len() == columns.len()).then_some(columns)
+}
+
+/// The stored values of one scan, in the order of the points.
 fn values(
     line: &str,
     start: usize,
     points: &[&Point],
+    columns: &[usize],
 ) -> std::result::Result<Vec<u64>, Vec<Diagnostic>> {
     // The lines of another tool may have the outputs behind an arrow.
     let inputs = line.split("->").next().unwrap_or_default();
@@ -184,9 +203,10 @@ fn values(
     if words.len() != points.len() {
         let message =
             format!("a scan has {} inputs, and this line has {}", points.len(), words.len());
-        let named: Vec<String> = points
+        let named: Vec<String> = columns
             .iter()
             .take(MAXIMUM_REPORTED)
+            .map(|&column| points[column])
             .map(|point| format!("{} : {}", point.name, point.declared()))
             .collect();
         let help = format!("in this order: {}", named.join(", "));
@@ -194,9 +214,10 @@ fn values(
         let diagnostic = Diagnostic::error("U0439", message, span);
         return Err(vec![diagnostic.with_help(help)]);
     }
-    let mut read = Vec::with_capacity(words.len());
+    let mut read = vec![0; words.len()];
     let mut wrong = Vec::new();
-    for (word, point) in words.into_iter().zip(points) {
+    for (word, &column) in words.into_iter().zip(columns) {
+        let point = points[column];
         let Some(stored) = point.of.read(word) else {
             let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
             let message = format!("invalid {} `{word}` for `{}`", point.of, point.name);
@@ -212,7 +233,7 @@ fn values(
             wrong.push(diagnostic.with_help("write a value of the range"));
             continue;
         }
-        read.push(stored);
+        read[column] = stored;
     }
     if wrong.is_empty() { Ok(read) } else { Err(wrong) }
 }

@@ -40,6 +40,25 @@ fn an_input_outside_its_subrange_is_refused() {
     }
 }
 
+/// Inputs at addresses come first, whatever the order of the declarations; a line with their names gives the file another order.
+#[test]
+fn a_line_with_names_gives_the_order_of_the_inputs() {
+    let folder = empty_folder("scan_named");
+    let text = "PROGRAM p VAR_INPUT i : INT; END_VAR VAR_OUTPUT o : INT; END_VAR
+        VAR x AT %IX0.0 : BOOL; y AT %QX0.0 : BOOL; END_VAR o := i; y := x; END_PROGRAM";
+    fs::write(folder.join("p.st"), text).expect("written");
+    let scanned = |lines: &str| {
+        fs::write(folder.join("inputs.txt"), lines).expect("written");
+        understudy_in(&folder, &["scan", "p.st", "--inputs", "inputs.txt"])
+    };
+    assert_eq!(scanned("1 7\n").output, "1 7 -> 1 7\n");
+    assert_eq!(scanned("# i X -> any\n7 1\n# x i\n0 8\n").output, "1 7 -> 1 7\n0 8 -> 0 8\n");
+    // Other comments are only that.
+    assert_eq!(scanned("# i i\n# i\n# i x y\n1 7\n").output, "1 7 -> 1 7\n");
+    let wrong = scanned("# i x\n7 1 1\n");
+    assert!(wrong.errors.contains("in this order: i : INT, x : BOOL"), "{}", wrong.shown());
+}
+
 /// What runs together is named, proved and drawn together, in each form.
 #[test]
 fn all_programs_of_a_file_are_meant() {
