@@ -59,6 +59,55 @@ fn a_line_with_names_gives_the_order_of_the_inputs() {
     assert!(wrong.errors.contains("in this order: i : INT, x : BOOL"), "{}", wrong.shown());
 }
 
+/// What sees the edges of an element of an array has a name that can be written.
+#[test]
+fn edges_of_elements_are_converted() {
+    let folder = empty_folder("scan_edges_of_elements");
+    let object = |name: &str, id: u32, from: u32, edge: &str, variable: &str| {
+        format!(
+            r#"<{name} localId="{id}" negated="false"{edge}><position x="{id}0" y="20"/>
+            <connectionPointIn><connection refLocalId="{from}"/></connectionPointIn><connectionPointOut/>
+            <variable>{variable}</variable></{name}>"#
+        )
+    };
+    let array = |name: &str, address: &str| {
+        format!(
+            r#"<variable name="{name}" address="{address}"><type><array><dimension lower="0" upper="1"/>
+            <baseType><BOOL/></baseType></array></type></variable>"#
+        )
+    };
+    let text = format!(
+        r#"<?xml version="1.0" encoding="utf-8"?>
+        <project xmlns="http://www.plcopen.org/xml/tc6_0201">
+        <fileHeader companyName="c" productName="p" productVersion="1" creationDateTime="2020-01-01T00:00:00"/>
+        <contentHeader name="n"><coordinateInfo><fbd><scaling x="1" y="1"/></fbd><ld><scaling x="1" y="1"/></ld>
+        <sfc><scaling x="1" y="1"/></sfc></coordinateInfo></contentHeader>
+        <types><dataTypes/><pous><pou name="main" pouType="program"><interface><localVars>{}{}</localVars></interface>
+        <body><LD><leftPowerRail localId="1"><position x="0" y="0"/><connectionPointOut formalParameter=""/></leftPowerRail>
+        {}{}</LD></body></pou></pous></types><instances><configurations/></instances></project>"#,
+        array("ia", "%IX0.0"),
+        array("oa", "%QX0.0"),
+        object("contact", 2, 1, r#" edge="rising""#, "ia[1]"),
+        object("coil", 3, 2, r#" edge="falling""#, "oa[0]"),
+    );
+    fs::write(folder.join("edges.xml"), text).expect("written");
+    fs::write(folder.join("inputs.txt"), "0 1\n0 1\n0 0\n1 0\n0 1\n").expect("written");
+    let scanned = |file: &str| {
+        let answer = understudy_in(&folder, &["scan", file, "--inputs", "inputs.txt"]);
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+        answer.output
+    };
+    let expected = scanned("edges.xml");
+    assert!(expected.contains("-> 1 0"), "{expected}");
+    for (from, to) in
+        [("edges.xml", "edges.st"), ("edges.st", "again.xml"), ("edges.xml", "more.xml")]
+    {
+        let answer = understudy_in(&folder, &["convert", from, to]);
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+        assert_eq!(scanned(to), expected, "{to}");
+    }
+}
+
 /// What runs together is named, proved and drawn together, in each form.
 #[test]
 fn all_programs_of_a_file_are_meant() {

@@ -290,12 +290,19 @@ fn with_written_names(file: &File, text: String) -> String {
         names_with_dots(unit, &mut made);
     }
     made.into_iter().fold(text, |text, name| {
-        let mut written = name.replace('.', "_");
+        let mut written = written_name(&name);
         while text.contains(&written) {
             written.push('_');
         }
         replaced(&text, &name, &written)
     })
+}
+
+/// A name that can be written in place of one that a reader has made: `ia_0_rising` of `ia[0].rising`.
+pub(crate) fn written_name(name: &str) -> String {
+    let words = name.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    words.join("_")
 }
 
 fn names_with_dots(unit: &Unit, made: &mut Vec<String>) {
@@ -364,7 +371,7 @@ fn compare(read: &Whole, again: &Whole) -> Result<usize, WriteError> {
 fn retentive(program: &Program) -> Vec<String> {
     let names = program.retentive_names().into_iter();
     let mut names: Vec<String> =
-        names.map(|name| name.to_ascii_uppercase().replace('.', "_")).collect();
+        names.map(|name| written_name(&name).to_ascii_uppercase()).collect();
     names.sort_unstable();
     names
 }

@@ -14,6 +14,7 @@ use super::drawn::{Uses, is_made};
 use super::lost::Lost;
 use super::network::constant;
 use super::{Found, Refused, Writer, refused};
+use crate::typed_text::written_name;
 
 /// What a name of the text stands for.
 #[derive(Debug, Clone)]
@@ -349,7 +350,7 @@ impl<'f> Writer<'f> {
 
 /// The name that a declaration should have in the ladder.
 fn wanted(name: &SourceName) -> String {
-    if is_made(name) { name.as_str().replace('.', "_") } else { name.as_str().to_owned() }
+    if is_made(name) { written_name(name.as_str()) } else { name.as_str().to_owned() }
 }
 
 /// A bit's address with its X, which may be left out.
