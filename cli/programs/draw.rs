@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_interchange::{Bodies, Wanted, digraph, draw_typed, listing};
+use understudy_interchange::{Bodies, Source, Wanted, digraph, draw_typed, listing};
 use understudy_ladder::{draw_svg, draw_text};
 use understudy_text::Report;
+use understudy_typed::Elementary;
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -51,7 +52,7 @@ enum Form {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let path = arguments.file.as_path();
     let wanted = Wanted { program: arguments.program.as_deref(), period: None };
-    let (_, mut file, _) = files::program(path, wanted)?;
+    let (source, mut file, _) = files::program(path, wanted)?;
     let ladder = file.rungs.take().map(|rungs| rungs.ladder);
     let is_picture = arguments.output.as_ref().and_then(|path| path.extension());
     let is_picture = is_picture.is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
@@ -60,7 +61,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         (Some(program), Form::Text) => (draw_text(&program), true),
         (Some(program), Form::Svg) => (draw_svg(&program), true),
         (Some(program), Form::Digraph) => (digraph::draw_svg(&program), true),
-        (None, Form::Digraph) => (digraph::draw_svg(&files::ladder(path)?.0), false),
+        (None, Form::Digraph) => {
+            of_bools(&source)?;
+            (digraph::draw_svg(&files::ladder(path)?.0), false)
+        }
         (_, form) => match typed(path, &mut file.report, wanted, form) {
             Ok(text) => (text, false),
             Err(answer) => return Err(answer.with_reports(file.reports())),
@@ -73,6 +77,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         _ => answer,
     };
     Ok(answer.with_reports(file.reports()))
+}
+
+/// A digraph has contacts and coils, so numbers would be as many signals as they have bits.
+fn of_bools(source: &Source) -> Result<(), Answer> {
+    let Source::Program(program) = source else {
+        return Ok(());
+    };
+    let mut points = program.inputs.iter().chain(&program.outputs);
+    let number = points.find(|point| point.slot != 0 && point.of != Elementary::Bool);
+    number.map_or(Ok(()), |number| {
+        let (name, of, program) = (&number.name, number.declared(), &program.name);
+        let message =
+            format!("`draw --as digraph` works on rungs, and `{name}` of `{program}` is {of}: use --as fbd or svg");
+        Err(Answer::failed(Status::BadInput, "U0438", message))
+    })
 }
 
 /// A program with numbers, or one that is drawn in another language than that of ladders.

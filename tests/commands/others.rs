@@ -73,6 +73,14 @@ fn a_program_with_numbers_is_drawn_in_its_language() {
     let digraph = understudy(&["draw", level, "--as", "digraph", "--json"]);
     assert_eq!(digraph.status, 2, "{}", digraph.shown());
     assert!(digraph.output.contains("\"U0438\""), "{}", digraph.shown());
+    // A number that has a circuit is no signal of rungs either.
+    let folder = empty_folder("draw-whole-numbers");
+    let text =
+        "PROGRAM p VAR_INPUT a : INT; END_VAR VAR_OUTPUT b : BOOL; END_VAR b := a > 3; END_PROGRAM";
+    fs::write(folder.join("p.st"), text).expect("written");
+    let whole = understudy_in(&folder, &["draw", "p.st", "--as", "digraph"]);
+    assert_eq!(whole.status, 2, "{}", whole.shown());
+    assert!(whole.errors.contains("`a` of `p` is INT"), "{}", whole.shown());
     let document = understudy(&["convert", level, "--to", "plcopen-fbd"]);
     assert!(document.output.contains("<FBD>"), "{}", document.shown());
     let text = understudy(&["convert", level, "--to", "plcopen"]);
