@@ -24,10 +24,10 @@ pub(super) struct Rule {
 }
 
 /// Writes that no record explains.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Default, Clone, PartialEq, Eq)]
 pub(super) struct Found {
-    /// Their number.
-    pub(super) unproved: u64,
+    /// When they were received.
+    pub(super) unproved: Vec<u64>,
     /// Those after the end of a process that may have driven them and has not recorded it.
     pub(super) unrecorded: u64,
 }
@@ -56,7 +56,7 @@ pub(super) fn judge(writes: &[Outputs], driven: &[Outputs], ends: &[u64], rule: 
         if ends.iter().any(may_be_lost) {
             found.unrecorded += 1;
         } else {
-            found.unproved += 1;
+            found.unproved.push(write.at_ns);
         }
     }
     found
@@ -86,17 +86,18 @@ mod tests {
         let driven: Vec<(u64, u64)> =
             (0..20).map(|cycle| (cycle * 10, if cycle < 10 { 1 } else { 2 })).collect();
         let driven = row(&driven);
-        let check = |writes: &[(u64, u64)], ends: &[u64], unproved: u64, unrecorded: u64| {
+        let check = |writes: &[(u64, u64)], ends: &[u64], unproved: &[u64], unrecorded: u64| {
             let found = judge(&row(writes), &driven, ends, RULE);
+            let unproved = unproved.to_vec();
             assert_eq!(found, Found { unproved, unrecorded }, "{writes:?}");
         };
-        check(&[(12, 1), (95, 2), (101, 2), (150, 1), (160, 0), (190, 2)], &[], 0, 0);
+        check(&[(12, 1), (95, 2), (101, 2), (150, 1), (160, 0), (190, 2)], &[], &[], 0);
         // The last 1 was driven at 90; nothing has driven 3.
-        check(&[(151, 1)], &[], 1, 0);
-        check(&[(80, 2)], &[], 1, 0);
-        check(&[(50, 3), (52, 0)], &[], 1, 0);
+        check(&[(151, 1)], &[], &[151], 0);
+        check(&[(80, 2)], &[], &[80], 0);
+        check(&[(50, 3), (52, 0)], &[], &[50], 0);
         // The author ends at 200, and what it has driven last may not be recorded.
-        check(&[(195, 3), (230, 3), (291, 3)], &[200], 1, 2);
+        check(&[(195, 3), (230, 3), (291, 3)], &[200], &[291], 2);
     }
 
     #[test]
