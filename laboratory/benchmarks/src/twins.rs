@@ -20,8 +20,8 @@ use understudy_remote_io::{Event, SWITCHOVER};
 use understudy_scenarios::{Action, Fault, Scenario};
 use understudy_wire::{Image, Member, ProgramId, SignalPlace, StationId, Via};
 
-use device::{Device, Recorded};
-use judge::{Found, Outputs, Rule, judge, longest_gap};
+use device::{Device, Recorded, TIMEOUT};
+use judge::{Found, Outputs, Rule, Write, judge, longest_gap};
 
 /// Kill and suspend members of a cell with twins and cut its networks, in front of devices that record who writes them
 #[derive(Debug, Args)]
@@ -260,6 +260,8 @@ struct Row {
     input_alarms: u64,
     /// Longest time without a write to the devices of a program, in periods.
     longest_gap_cycles: f64,
+    /// Longest time that a device took to answer, in periods: a remote I/O gives up one that does not answer within its `timeout`.
+    slowest_answer_cycles: f64,
 }
 
 /// What the members of a run have recorded of the outputs of one program.
@@ -340,10 +342,10 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
 fn keep_writes(directory: &Path, taken: &[[Recorded; 2]]) -> std::io::Result<()> {
     for (side, pair) in ["left", "right"].into_iter().zip(taken) {
         for (name, recorded) in [format!("{side}-io"), format!("{side}-io-2")].iter().zip(pair) {
-            let mut text = "at_ns,coils,two_writers\n".to_owned();
-            for Outputs { at_ns, coils } in &recorded.writes {
+            let mut text = "at_ns,since_ns,coils,two_writers\n".to_owned();
+            for Write { at_ns, since_ns, coils } in &recorded.writes {
                 let by_two = recorded.by_two.binary_search(at_ns).is_ok();
-                let _ = writeln!(text, "{at_ns},{coils},{}", u8::from(by_two));
+                let _ = writeln!(text, "{at_ns},{since_ns},{coils},{}", u8::from(by_two));
             }
             fs::write(directory.join(format!("writes-{name}.csv")), text)?;
         }
@@ -395,6 +397,7 @@ fn row(
     let ns = |periods: u32| u64::try_from((period * periods).as_nanos()).unwrap_or(u64::MAX);
     let rule = Rule {
         oldest: ns(arguments.take_over_after + SWITCHOVER + 1 + UNDER_WAY),
+        unread: TIMEOUT.as_nanos() as u64,
         recorded_after: ns(UNDER_WAY),
         unrecorded: ns(UNRECORDED),
     };
@@ -405,6 +408,7 @@ fn row(
     let found: Vec<Found> = found.collect();
     let gaps = taken.iter().map(|[first, twin]| longest_gap(&[&first.writes, &twin.writes]));
     let longest = gaps.max().unwrap_or(0);
+    let slowest = taken.as_flattened().iter().map(|it| it.slowest_ns).max().unwrap_or(0);
     let total = summary.total();
     Ok(Row {
         fault: of.words(),
@@ -426,12 +430,13 @@ fn row(
         unrecorded: found.iter().map(|it| it.unrecorded).sum(),
         input_alarms: programs.iter().map(|it| it.input_alarms).sum(),
         longest_gap_cycles: longest as f64 / period.as_nanos() as f64,
+        slowest_answer_cycles: slowest as f64 / period.as_nanos() as f64,
     })
 }
 
 fn answer(rows: &[Row]) -> Answer {
     let mut text = format!(
-        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12}\n",
+        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12} {:>15}\n",
         "fault",
         "count",
         "wrong",
@@ -444,12 +449,13 @@ fn answer(rows: &[Row]) -> Answer {
         "unproved",
         "unrecorded",
         "input alarms",
-        "longest gap"
+        "longest gap",
+        "slowest answer"
     );
     for row in rows {
         let _ = writeln!(
             text,
-            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12.1}",
+            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12.1} {:>15.1}",
             row.fault,
             row.count,
             row.wrong,
@@ -462,13 +468,14 @@ fn answer(rows: &[Row]) -> Answer {
             row.unproved,
             row.unrecorded,
             row.input_alarms,
-            row.longest_gap_cycles
+            row.longest_gap_cycles,
+            row.slowest_answer_cycles
         );
         for violation in &row.violations {
             let _ = writeln!(text, "    {violation}");
         }
     }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nthe longest gap is that between two writes to the devices of a program, in periods\n");
+    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
     let is_right =
         |row: &Row| (row.wrong, row.by_two, row.unproved, row.input_alarms) == (0, 0, 0, 0);
     let passed = rows.iter().all(is_right);

@@ -3,21 +3,26 @@
 //! A writer is a connection. Two writers at one time are found by their order: once a connection has written, an earlier one must not write any more.
 //!
 //! The order is that in which the kernel of this host has received the requests, by its own time stamps. Threads of the device may be late on a busy
-//! machine, each by another time; that changes nothing of what is recorded.
+//! machine, each by another time; that changes nothing of the order. They run in real time where the system grants it, as a device with a processor of its own
+//! does, and the slowest answer is recorded: a remote I/O gives a device up that does not answer in time, and that is none of its failures.
 
-use std::io::{self, ErrorKind, IoSliceMut, Read, Write};
+use std::io::{self, ErrorKind, IoSliceMut, Read, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::fd::AsRawFd;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use nix::cmsg_space;
-use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg, setsockopt, sockopt};
+use nix::sys::socket::{ControlMessageOwned, MsgFlags, recv, recvmsg, setsockopt, sockopt};
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, clock_gettime};
+use understudy_bus::keep_times;
 use understudy_journal::monotonic_ns;
 
-use super::judge::Outputs;
+use super::judge::Write;
+
+/// Time within which a remote I/O wants an answer, and ends the connection otherwise: the `timeout` of a field device.
+pub(super) const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// Coils and discrete inputs.
 const POINTS: usize = 64;
@@ -35,17 +40,21 @@ const CLOCK_TOLERANCE_NS: u64 = 1_000_000;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Recorded {
     /// Its coils after each write.
-    pub(super) writes: Vec<Outputs>,
+    pub(super) writes: Vec<Write>,
     /// Connections that have written.
     pub(super) writers: u64,
     /// When a connection has written after a later one, in ns of the monotonic clock.
     pub(super) by_two: Vec<u64>,
+    /// Longest time from a request to its answer, in ns.
+    pub(super) slowest_ns: u64,
 }
 
 /// A request to write, as it was received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Request {
     at_ns: u64,
+    /// From when on it may have been received.
+    since_ns: u64,
     connection: u64,
     /// The coils that it writes.
     coils: u64,
@@ -65,7 +74,7 @@ impl Written {
         // Those of one connection are in its order.
         requests.sort_by_key(|request| request.at_ns);
         let mut recorded = Recorded::default();
-        for Request { at_ns, connection, coils, values } in requests {
+        for Request { at_ns, since_ns, connection, coils, values } in requests {
             self.coils = self.coils & !coils | values;
             if self.writer.is_some_and(|newest| connection < newest) {
                 recorded.by_two.push(at_ns);
@@ -73,7 +82,7 @@ impl Written {
                 recorded.writers += 1;
                 self.writer = Some(connection);
             }
-            recorded.writes.push(Outputs { at_ns, coils: self.coils });
+            recorded.writes.push(Write { at_ns, since_ns, coils: self.coils });
         }
         recorded
     }
@@ -84,6 +93,7 @@ struct State {
     /// Its coils as it answers them.
     coils: u64,
     requests: Vec<Request>,
+    slowest_ns: u64,
     /// Connections that are read.
     open: u64,
     written: Written,
@@ -143,6 +153,12 @@ impl Connection {
                 return Ok(None);
             }
         }
+    }
+
+    /// Whether nothing more comes; it does not wait.
+    fn has_ended(&self) -> bool {
+        let flags = MsgFlags::MSG_PEEK | MsgFlags::MSG_DONTWAIT;
+        self.buffer.is_empty() && recv(self.stream.as_raw_fd(), &mut [0], flags) == Ok(0)
     }
 
     /// Whether more was received.
@@ -236,7 +252,8 @@ impl Device {
         }
         let mut state = self.state();
         let requests = std::mem::take(&mut state.requests);
-        Ok(state.written.take(requests))
+        let slowest_ns = std::mem::take(&mut state.slowest_ns);
+        Ok(Recorded { slowest_ns, ..state.written.take(requests) })
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -245,18 +262,24 @@ impl Device {
 
     fn serve(&self, stream: TcpStream, number: u64) -> io::Result<()> {
         stream.set_nodelay(true)?;
+        keep_times(true);
         let mut connection = Connection { stream, buffer: Vec::new(), received_ns: 0 };
         while let Some((head, request)) = connection.next()? {
             let at_ns = connection.received_ns.saturating_sub(self.ahead_ns);
-            let answer = self.answer(&request, (at_ns, number));
+            // The kernel stamps bytes that are unread with the end of their connection.
+            let unread = if connection.has_ended() { TIMEOUT.as_nanos() as u64 } else { 0 };
+            let answer = self.answer(&request, (at_ns, at_ns.saturating_sub(unread)), number);
             let length = (answer.len() as u16 + 1).to_be_bytes();
             let frame = [&head[..4], &length, &head[6..], &answer].concat();
             connection.stream.write_all(&frame)?;
+            let took_ns = monotonic_ns().saturating_sub(at_ns);
+            let mut state = self.state();
+            state.slowest_ns = state.slowest_ns.max(took_ns);
         }
         Ok(())
     }
 
-    fn answer(&self, request: &[u8], received: (u64, u64)) -> Vec<u8> {
+    fn answer(&self, request: &[u8], received: (u64, u64), connection: u64) -> Vec<u8> {
         let number = |at: usize| match request.get(at..at + 2) {
             Some(&[high, low]) => usize::from(u16::from_be_bytes([high, low])),
             _ => POINTS,
@@ -281,7 +304,7 @@ impl Device {
                 [vec![function, bytes.len() as u8], bytes].concat()
             }
             5 => {
-                self.write(received, first, &[number(3) == 0xFF00]);
+                self.write(received, connection, first, &[number(3) == 0xFF00]);
                 request.to_vec()
             }
             15 => {
@@ -289,20 +312,20 @@ impl Device {
                 let bit =
                     |at: usize| bytes.get(at / 8).is_some_and(|byte| byte >> (at % 8) & 1 == 1);
                 let values: Vec<bool> = (0..count).map(bit).collect();
-                self.write(received, first, &values);
+                self.write(received, connection, first, &values);
                 request[..5].to_vec()
             }
             _ => vec![function | 0x80, 1],
         }
     }
 
-    fn write(&self, (at_ns, connection): (u64, u64), first: usize, new: &[bool]) {
+    fn write(&self, (at_ns, since_ns): (u64, u64), connection: u64, first: usize, new: &[bool]) {
         let places = || new.iter().zip(first..);
         let coils = places().map(|(_, place)| 1 << place).sum::<u64>();
         let values = places().filter(|(on, _)| **on).map(|(_, place)| 1 << place).sum::<u64>();
         let mut state = self.state();
         state.coils = state.coils & !coils | values;
-        state.requests.push(Request { at_ns, connection, coils, values });
+        state.requests.push(Request { at_ns, since_ns, connection, coils, values });
     }
 }
 
@@ -343,13 +366,21 @@ mod tests {
         let tolerance = CLOCK_TOLERANCE_NS;
         let is_within = |at: u64| began <= at + tolerance && at <= ended + tolerance;
         assert!(times.clone().is_sorted() && times.clone().all(is_within), "{began} {recorded:?}");
-        assert_eq!(device.take().expect("none is open"), Recorded::default());
+        assert!(recorded.slowest_ns > 0);
+        let nothing = device.take().expect("none is open");
+        assert_eq!((nothing.writes, nothing.writers, nothing.by_two), (vec![], 0, vec![]));
     }
 
     /// Whichever thread is late: the order is that of the kernel.
     #[test]
     fn requests_count_in_the_order_in_which_they_were_received() {
-        let request = |at_ns, connection, values| Request { at_ns, connection, coils: 3, values };
+        let request = |at_ns, connection, values| Request {
+            at_ns,
+            since_ns: at_ns,
+            connection,
+            coils: 3,
+            values,
+        };
         let mut written = Written::default();
         let late = vec![request(30, 1, 2), request(10, 0, 1), request(20, 0, 3), request(40, 1, 0)];
         let recorded = written.take(late);
