@@ -58,6 +58,10 @@ fn twins_that_cannot_work_are_refused_in_words_of_the_cluster_file() {
     let address = "address = \"10.0.1.21:7450\"";
     let twice = "two members have the address 10.0.1.21:7450";
     check(pump("", &exclusive(address), ""), "U0210", &[twice]);
+    let (_, codes, messages, helps) =
+        found(&pump("", &exclusive("address = \"10.0.1.21:7460\""), modbus));
+    assert!(codes.iter().any(|it| it == "U0262"), "{codes:?}");
+    assert!(messages.contains("both at 10.0.1.21") && helps.contains("another machine"));
     let one_host = "address = \"10.0.1.22:7450\"\nsecond_address = \"10.0.1.22:7451\"";
     let on_both =
         ["10.0.1.22 is on the first and on the second network", "an interface of its own"];
