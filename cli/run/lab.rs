@@ -100,6 +100,11 @@ fn parse_network(text: &str) -> Result<Via, String> {
 }
 
 impl NetworkArguments {
+    /// Whether the processes run in network namespaces, where a device of this host is not reached.
+    pub fn has_namespaces(&self) -> bool {
+        self.hosts == HostArgument::Netns
+    }
+
     /// The same arguments with a loss of `share`, unless a loss was given.
     pub fn losing(&self, share: Share) -> Self {
         Self { impairment: self.impairment.losing(share), ..self.clone() }

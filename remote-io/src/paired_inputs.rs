@@ -7,7 +7,10 @@
 //!     └────────── they agree ───────────┴──────────── both move, and agree ────────────────────┴──────── the operator releases it ─┘
 //! ```
 //!
-//! Invariant: while two readings differ and neither module is excluded, the value that was sampled last counts.
+//! Samples with one reading count for nothing here: they end no doubt and no count, since they say nothing of the module that is not read.
+//!
+//! Invariant: while two readings differ and neither module is excluded, the value that was sampled last counts. A doubt ends by two readings, by an
+//! exclusion, or by the operator, and by nothing else.
 
 use understudy_wire::Image;
 
@@ -80,21 +83,15 @@ pub(crate) enum Module {
     Twin,
 }
 
-impl Module {
-    fn other(self) -> Self {
-        if self == Self::First { Self::Twin } else { Self::First }
-    }
-}
-
 /// How the two modules of an input stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Standing {
     /// They show the same.
     Agree,
-    /// They have differed in this number of samples in a row.
+    /// They have differed in this number of samples in a row, of those in which both were read.
     Differ(u32),
-    /// They differ for too long, since they showed these values.
-    Doubted([u64; 2]),
+    /// They differ for too long, since they showed these values; `None` where one of them was not read since: both may have moved.
+    Doubted(Option<[u64; 2]>),
     /// This one does not count until the operator releases it.
     Excluded(Module),
 }
@@ -106,19 +103,19 @@ impl Standing {
         let agreed = input.agreed(readings);
         let next = match *self {
             Self::Excluded(_) => *self,
-            Self::Doubted([old_first, old_twin]) => {
+            Self::Doubted(Some([old_first, old_twin])) => {
                 match (input.moves(old_first, first), input.moves(old_twin, twin)) {
                     (true, false) => Self::Excluded(Module::Twin),
                     (false, true) => Self::Excluded(Module::First),
                     _ if agreed.is_some() => Self::Agree,
-                    (true, true) => Self::Doubted(readings),
+                    (true, true) => Self::Doubted(Some(readings)),
                     (false, false) => *self,
                 }
             }
             _ if agreed.is_some() => Self::Agree,
             Self::Agree if patience > 1 => Self::Differ(1),
             Self::Differ(cycles) if cycles + 1 < patience => Self::Differ(cycles + 1),
-            Self::Agree | Self::Differ(_) => Self::Doubted(readings),
+            Self::Agree | Self::Differ(_) | Self::Doubted(None) => Self::Doubted(Some(readings)),
         };
         *self = next;
         match next {
@@ -130,13 +127,23 @@ impl Standing {
 
     /// Takes the reading of one module, where the other one is not received or has no value.
     fn take_one(&mut self, module: Module, reading: u64) -> Option<u64> {
-        if *self == Self::Excluded(module) {
-            return None;
+        match self {
+            Self::Excluded(excluded) => (*excluded != module).then_some(reading),
+            Self::Doubted(since) => {
+                *since = None;
+                Some(reading)
+            }
+            Self::Agree | Self::Differ(_) => Some(reading),
         }
-        if *self != Self::Excluded(module.other()) {
-            *self = Self::Agree;
+    }
+
+    /// The modules whose readings are not trusted: one that is excluded, or both where they are in doubt.
+    fn distrusts(self, module: Module) -> bool {
+        match self {
+            Self::Agree | Self::Differ(_) => false,
+            Self::Doubted(_) => true,
+            Self::Excluded(excluded) => excluded == module,
         }
-        Some(reading)
     }
 
     /// What an operator is told of it.
@@ -223,12 +230,13 @@ impl PairedInputs {
         }
     }
 
-    /// The first bits of the inputs whose module is excluded, at the first remote I/O and at the twin.
-    pub(crate) fn excluded(&self, inputs: &[PairedInput]) -> [Image; 2] {
+    /// The first bits of the inputs whose module is not trusted, at the first remote I/O and at the twin: at one of them where it is excluded, at both where
+    /// they are in doubt.
+    pub(crate) fn distrusted(&self, inputs: &[PairedInput]) -> [Image; 2] {
         [Module::First, Module::Twin].map(|module| {
             let mut image = Image::zero(self.last.width());
             for (input, standing) in inputs.iter().zip(&self.standings) {
-                if *standing == Standing::Excluded(module) {
+                if standing.distrusts(module) {
                     image.set(usize::from(input.place.bit), true);
                 }
             }
@@ -236,16 +244,18 @@ impl PairedInputs {
         })
     }
 
-    /// Excludes the modules that the other remote I/O had excluded.
-    pub(crate) fn exclude(&mut self, inputs: &[PairedInput], excluded: &[Image; 2]) {
+    /// Goes on with the exclusions and the doubts of the other remote I/O.
+    pub(crate) fn distrust(&mut self, inputs: &[PairedInput], distrusted: &[Image; 2]) {
         for (input, standing) in inputs.iter().zip(&mut self.standings) {
-            for (module, image) in [Module::First, Module::Twin].into_iter().zip(excluded) {
-                let place = usize::from(input.place.bit);
-                if place < image.width() && image.get(place) {
-                    *standing = Standing::Excluded(module);
-                    self.changes.push((input.place.bit, standing.told()));
-                }
-            }
+            let place = usize::from(input.place.bit);
+            let found = distrusted.each_ref().map(|it| place < it.width() && it.get(place));
+            *standing = match found {
+                [false, false] => continue,
+                [true, false] => Standing::Excluded(Module::First),
+                [false, true] => Standing::Excluded(Module::Twin),
+                [true, true] => Standing::Doubted(None),
+            };
+            self.changes.push((input.place.bit, standing.told()));
         }
     }
 }

@@ -35,6 +35,7 @@ mod scan;
 mod searches;
 mod terminal;
 mod twincat;
+mod twins;
 mod verdicts;
 mod verify;
 mod view;

@@ -77,7 +77,7 @@ fn applied(record: &Value, name: &str, source: &str) -> bool {
     is(record, name, "applied") && record["event"]["source"] == source
 }
 
-fn operate(run: &Path, name: &str, command: &str) -> (i32, Value) {
+pub(super) fn operate(run: &Path, name: &str, command: &str) -> (i32, Value) {
     let run = run.to_str().expect("text");
     let (status, document, _) = answer(&["operate", run, "--name", name, command]);
     (status, document)

@@ -27,6 +27,7 @@ mod shared;
 mod standing_still;
 mod suspended;
 mod tennessee_eastman;
+mod twins;
 mod writes;
 
 use std::collections::BTreeSet;

@@ -69,7 +69,8 @@ pub(super) fn members(
         };
         let twin = group.cluster.as_ref().and_then(|cluster| {
             let twin = cluster.remote_ios()[place].twin.as_ref()?;
-            Some(group.name(&twin.name))
+            let (name, has_terminals) = (group.name(&twin.name), twin.is_parallel());
+            Some(understudy_allocation::Twin { name, has_terminals })
         });
         Ok(Member {
             program: Resources::of(&member.ladder),

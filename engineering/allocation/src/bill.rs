@@ -64,19 +64,24 @@ impl Part {
     }
 }
 
-/// The boxes of a plan with `networks` networks; the same with a twin for each remote I/O and two networks; and hot-standby pairs with redundant remote
-/// I/Os and two networks. Nothing without networks, and for programs whose terminals are on their own controllers.
+/// The boxes of a plan with `networks` networks; the same with a twin for each remote I/O, those that are added with terminals of their own, and two networks;
+/// and hot-standby pairs with redundant remote I/Os and two networks. Nothing without networks, and for programs whose terminals are on their own controllers.
 pub(crate) fn bill(items: &[Placed], boxes: &[BoxOnPlan], networks: usize) -> Vec<BillRow> {
     let role = |name: &String| items.iter().find(|item| item.name == *name).map(|item| item.role);
     let (mut controllers, mut understudies) = (Part::default(), Part::default());
-    let (mut firsts, mut twins) = (Part::default(), Part::default());
+    // Remote I/Os with their twins, and those without one once more.
+    let (mut firsts, mut twins, mut single) = (Part::default(), Part::default(), Part::default());
     for taken in boxes {
         let price = taken.controller.number(Quantity::Price);
         let roles: Vec<Role> = taken.items.iter().filter_map(role).collect();
         let is_twin =
             items.iter().any(|item| item.twin_of.is_some() && taken.items.contains(&item.name));
+        let has_twin = |name: &String| items.iter().any(|item| item.twin_of.as_ref() == Some(name));
         if roles.contains(&Role::RemoteIo) {
             if is_twin { &mut twins } else { &mut firsts }.add(price);
+            if !is_twin && !taken.items.iter().any(has_twin) {
+                single.add(price);
+            }
         } else if roles.contains(&Role::Controller) {
             controllers.add(price);
         } else {
@@ -107,7 +112,7 @@ pub(crate) fn bill(items: &[Placed], boxes: &[BoxOnPlan], networks: usize) -> Ve
     let stations = controllers.and(&understudies);
     vec![
         row("this cell", &stations, &firsts.and(&twins), networks),
-        row("this cell, twins, two networks", &stations, &firsts.times(2), 2),
+        row("this cell, twins, two networks", &stations, &firsts.and(&twins).and(&single), 2),
         row(
             "hot-standby pairs, redundant I/O, two networks",
             &controllers.times(2),

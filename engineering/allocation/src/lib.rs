@@ -43,7 +43,7 @@ pub use fit::{Dimension, Finding, Fit, Load, Verdict, fit};
 pub use instructions::{Instruction, Operator, instructions};
 pub use modules::{Assessment, ModuleFault, Modules, assess};
 pub use need::{MOST_RESERVE_PERCENT, Need, Terms};
-pub use plant::{Group, Member, alone};
+pub use plant::{Group, Member, Twin, alone};
 pub use report::{Provenance, ReportError, csv, html, text};
 pub use requirement::{Asked, Bound, Requirement, RequirementError, Role};
 pub use resources::Resources;

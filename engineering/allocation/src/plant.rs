@@ -1,7 +1,7 @@
 //! Controller positions required by the programs of a plant.
 //!
 //! Where remote I/Os have the terminals, a group of programs wants a controller for each, its understudies, a remote I/O for each, and its twin;
-//! all of them speak over a network, and scan once a period. A program that stands alone wants one controller with its terminals.
+//! all of them speak over a network, and scan once a period. A twin that reaches the terminals of the first remote I/O has none. A program that stands alone wants one controller with its terminals.
 
 use std::time::Duration;
 
@@ -21,8 +21,17 @@ pub struct Member {
     pub verification: Verification,
     /// The name of the remote I/O with its terminals.
     pub remote_io: String,
-    /// The name of the twin of this remote I/O.
-    pub twin: Option<String>,
+    /// The twin of this remote I/O.
+    pub twin: Option<Twin>,
+}
+
+/// A second remote I/O of a program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Twin {
+    /// Its name.
+    pub name: String,
+    /// Whether it has terminals of its own; otherwise both reach those of the first one.
+    pub has_terminals: bool,
 }
 
 /// Programs with one generated understudy.
@@ -68,26 +77,32 @@ impl Group {
             verification: verification.clone(),
             twin_of: None,
         });
-        let remote_io = |member: &Member, name: &str, twin_of: Option<String>| Item {
-            name: name.to_owned(),
-            group: Some(number),
-            need: Need {
-                role: Role::RemoteIo,
-                inputs: member.program.inputs,
-                outputs: member.program.outputs,
-                analog_inputs: member.program.analog_inputs,
-                analog_outputs: member.program.analog_outputs,
-                program: None,
-                scan_within: None,
-                ethernet: true,
-            },
-            verification: member.verification.clone(),
-            twin_of,
+        let without_terminals = Need { role: Role::RemoteIo, ethernet: true, ..Need::nothing() };
+        let with_terminals = |member: &Member| Need {
+            inputs: member.program.inputs,
+            outputs: member.program.outputs,
+            analog_inputs: member.program.analog_inputs,
+            analog_outputs: member.program.analog_outputs,
+            ..without_terminals.clone()
         };
         let remote_ios = self.members.iter().flat_map(|member| {
-            let first = remote_io(member, &member.remote_io, None);
-            let twin = member.twin.as_ref();
-            let twin = twin.map(|name| remote_io(member, name, Some(member.remote_io.clone())));
+            let first = Item {
+                name: member.remote_io.clone(),
+                group: Some(number),
+                need: with_terminals(member),
+                verification: member.verification.clone(),
+                twin_of: None,
+            };
+            let twin = member.twin.as_ref().map(|twin| Item {
+                name: twin.name.clone(),
+                need: if twin.has_terminals {
+                    with_terminals(member)
+                } else {
+                    without_terminals.clone()
+                },
+                twin_of: Some(member.remote_io.clone()),
+                ..first.clone()
+            });
             [first].into_iter().chain(twin)
         });
         controllers.chain(understudies).chain(remote_ios).collect()

@@ -1,5 +1,6 @@
 //! `understudy-bench twins`: a cell of two networks, an understudy and twins on Modbus devices that record each write. Processes are killed and
-//! suspended, and networks cut, at random phases of the cycle, one or two at once.
+//! suspended, and networks cut, at random phases of the cycle, one or two at once. With `--hosts netns` each machine has a namespace and each network a
+//! bridge, and cables are pulled; the plants are simulated then, since a namespace does not reach the devices of this process.
 
 mod device;
 mod judge;
@@ -19,8 +20,8 @@ use understudy_remote_io::{Event, SWITCHOVER};
 use understudy_scenarios::{Action, Fault, Scenario};
 use understudy_wire::{Image, Member, ProgramId, SignalPlace, StationId, Via};
 
-use device::{Device, Recorded};
-use judge::{Outputs, Rule, judge, longest_gap};
+use device::{Device, Recorded, TIMEOUT};
+use judge::{Found, Outputs, Rule, Write, judge, longest_gap};
 
 /// Kill and suspend members of a cell with twins and cut its networks, in front of devices that record who writes them
 #[derive(Debug, Args)]
@@ -182,13 +183,9 @@ fn scenario(cluster: &Cluster, of: Target, count: u32, random: &mut Pcg64Mcg) ->
 /// Devices of each program: of its remote I/O, and of the twin, which uses it with `parallel` only.
 type Devices = [[Device; 2]; 2];
 
-/// The cluster file, with the devices of its programs.
-fn files(
-    folder: &Path,
-    devices: &Devices,
-    take_over_after: u32,
-    wiring: Wiring,
-) -> std::io::Result<PathBuf> {
+/// The cluster file, with the devices of its programs, or with simulated plants.
+fn files(arguments: &Arguments, devices: Option<&Devices>) -> std::io::Result<PathBuf> {
+    let Arguments { folder, take_over_after, wiring, .. } = arguments;
     let mut text = "[cluster]\nname = \"twins\"\nperiod = \"10ms\"\nnetworks = 2\n".to_owned();
     for name in ["left", "right"] {
         let _ = writeln!(text, "[[controller]]\nname = \"{name}\"\nladder = \"robot.ladder\"");
@@ -196,16 +193,31 @@ fn files(
     text.push_str("[[understudy]]\nname = \"understudy\"\n");
     let coils = OUTPUTS.iter().enumerate().map(|(coil, name)| format!("{name} = \"coil:{coil}\""));
     let coils = coils.collect::<Vec<_>>().join(", ");
-    for (name, [device, of_twin]) in ["left", "right"].into_iter().zip(devices) {
-        let wiring = match wiring {
-            Wiring::Exclusive => "wiring = \"exclusive\"".to_owned(),
-            Wiring::Parallel => format!("wiring = \"parallel\", modbus = \"{}\"", of_twin.address),
+    for (place, name) in ["left", "right"].into_iter().enumerate() {
+        let pair = devices.map(|all| &all[place]);
+        let (kind, modbus) = match (wiring, pair) {
+            (Wiring::Exclusive, _) => ("exclusive", String::new()),
+            (Wiring::Parallel, None) => ("parallel", String::new()),
+            (Wiring::Parallel, Some([_, of_twin])) => {
+                ("parallel", format!(", modbus = \"{}\"", of_twin.address))
+            }
+        };
+        let _ = writeln!(
+            text,
+            "[[remote_io]]\nname = \"{name}-io\"\ncontroller = \"{name}\"\n\
+             twin = {{ name = \"{name}-io-2\", wiring = \"{kind}\"{modbus}, take_over_after = {take_over_after} }}"
+        );
+        let Some([device, _]) = pair else {
+            let watchdog = take_over_after + SWITCHOVER + 1;
+            let _ = writeln!(
+                text,
+                "[[plant]]\nname = \"{name}-arm\"\ncontroller = \"{name}\"\nmodel = \"robot\"\nwatchdog_cycles = {watchdog}"
+            );
+            continue;
         };
         let _ = write!(
             text,
-            "[[remote_io]]\nname = \"{name}-io\"\ncontroller = \"{name}\"\n\
-             twin = {{ name = \"{name}-io-2\", {wiring}, take_over_after = {take_over_after} }}\n\
-             [remote_io.field]\nmodbus = \"{}\"\n\
+            "[remote_io.field]\nmodbus = \"{}\"\n\
              inputs = {{ part_present = \"discrete:0\", arm_left = \"discrete:1\", arm_right = \"discrete:2\", arm_up = \"discrete:3\", arm_down = \"discrete:4\", stop = \"discrete:5\" }}\n\
              outputs = {{ {coils} }}\n",
             device.address
@@ -248,6 +260,8 @@ struct Row {
     input_alarms: u64,
     /// Longest time without a write to the devices of a program, in periods.
     longest_gap_cycles: f64,
+    /// Longest time that a device took to answer, in periods: a remote I/O gives up one that does not answer within its `timeout`.
+    slowest_answer_cycles: f64,
 }
 
 /// What the members of a run have recorded of the outputs of one program.
@@ -307,25 +321,57 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         let twin = first.beside()?;
         Ok([first, twin])
     };
-    let devices = [pair().map_err(failed)?, pair().map_err(failed)?];
-    let file = files(&arguments.folder, &devices, arguments.take_over_after, arguments.wiring)
-        .map_err(failed)?;
+    let devices = match arguments.run.network.has_namespaces() {
+        true => None,
+        false => Some([pair().map_err(failed)?, pair().map_err(failed)?]),
+    };
+    let file = files(arguments, devices.as_ref()).map_err(failed)?;
     let mut random = Pcg64Mcg::seed_from_u64(arguments.seed);
     let mut rows = Vec::new();
     for of in Target::ALL {
         let count = of.share(arguments.count);
         if count > 0 {
-            rows.push(row(of, count, &file, &devices, arguments, &mut random, console)?);
+            let found = row(of, count, &file, devices.as_ref(), arguments, &mut random, console)?;
+            rows.push(found);
         }
     }
     Ok(answer(&rows))
+}
+
+/// Keeps what the devices have received with the run, so that each finding can be looked up: the time as in the journal, and the coils.
+fn keep_writes(directory: &Path, taken: &[[Recorded; 2]]) -> std::io::Result<()> {
+    for (side, pair) in ["left", "right"].into_iter().zip(taken) {
+        for (name, recorded) in [format!("{side}-io"), format!("{side}-io-2")].iter().zip(pair) {
+            let mut text = "at_ns,since_ns,coils,two_writers\n".to_owned();
+            for Write { at_ns, since_ns, coils } in &recorded.writes {
+                let by_two = recorded.by_two.binary_search(at_ns).is_ok();
+                let _ = writeln!(text, "{at_ns},{since_ns},{coils},{}", u8::from(by_two));
+            }
+            fs::write(directory.join(format!("writes-{name}.csv")), text)?;
+        }
+    }
+    Ok(())
+}
+
+/// The first findings of each device, with the times of the files that [`keep_writes`] writes.
+fn of_devices(taken: &[[Recorded; 2]], found: &[Found]) -> Vec<String> {
+    let names = ["left-io", "left-io-2", "right-io", "right-io-2"];
+    let all = names.iter().zip(taken.as_flattened()).zip(found);
+    let findings = all.flat_map(|((name, recorded), found)| {
+        let both = [("two writers", &recorded.by_two), ("unproved", &found.unproved)];
+        both.into_iter().flat_map(move |(what, times)| {
+            let times = times.iter().take(5);
+            times.map(move |at_ns| format!("{what}: a write to the device of {name} at {at_ns} ns"))
+        })
+    });
+    findings.collect()
 }
 
 fn row(
     of: Target,
     count: u32,
     file: &Path,
-    devices: &Devices,
+    devices: Option<&Devices>,
     arguments: &Arguments,
     random: &mut Pcg64Mcg,
     console: &mut Console,
@@ -333,19 +379,25 @@ fn row(
     let cell = ClusterRun::of_file(file.to_owned(), &arguments.run)?;
     let scenario = scenario(&cell.cluster, of, count, random).shortened(arguments.run.cycles);
     console.note(&scenario.title);
-    for device in devices.as_flattened() {
-        device.take();
+    let failed = |error: std::io::Error| Answer::failed(Status::Failed, "U0602", error);
+    for device in devices.into_iter().flatten().flatten() {
+        device.take().map_err(failed)?;
     }
     let (summary, judged) = cell.judged(&scenario, &arguments.run, console)?;
     if let Some(failure) = judged.failure {
         return Err(Answer::failed(Status::Failed, failure.code(), &failure));
     }
-    let taken = devices.each_ref().map(|pair| pair.each_ref().map(Device::take));
+    let mut taken: Vec<[Recorded; 2]> = Vec::new();
+    for [first, twin] in devices.into_iter().flatten() {
+        taken.push([first.take().map_err(failed)?, twin.take().map_err(failed)?]);
+    }
+    keep_writes(cell.path(), &taken).map_err(failed)?;
     let sum = |of: fn(&Recorded) -> u64| taken.as_flattened().iter().map(of).sum();
     let period = cell.cluster.agreement().schedule.period();
     let ns = |periods: u32| u64::try_from((period * periods).as_nanos()).unwrap_or(u64::MAX);
     let rule = Rule {
         oldest: ns(arguments.take_over_after + SWITCHOVER + 1 + UNDER_WAY),
+        unread: TIMEOUT.as_nanos() as u64,
         recorded_after: ns(UNDER_WAY),
         unrecorded: ns(UNRECORDED),
     };
@@ -353,37 +405,38 @@ fn row(
     let pairs = programs.iter().zip(&taken);
     let devices = pairs.flat_map(|(program, pair)| pair.iter().map(move |it| (program, it)));
     let found = devices.map(|(program, it)| judge(&it.writes, &program.driven, &ends, rule));
-    let found: Vec<judge::Found> = found.collect();
+    let found: Vec<Found> = found.collect();
     let gaps = taken.iter().map(|[first, twin]| longest_gap(&[&first.writes, &twin.writes]));
     let longest = gaps.max().unwrap_or(0);
+    let slowest = taken.as_flattened().iter().map(|it| it.slowest_ns).max().unwrap_or(0);
     let total = summary.total();
     Ok(Row {
         fault: of.words(),
         count,
         directory: cell.path().display().to_string(),
         wrong: summary.violation_count,
-        violations: summary
-            .violations
-            .iter()
-            .take(5)
-            .map(|it| format!("cycle {}, {}: {}", it.cycle, it.name, it.what))
-            .collect(),
+        violations: {
+            let wrong = summary.violations.iter().take(5);
+            let wrong = wrong.map(|it| format!("cycle {}, {}: {}", it.cycle, it.name, it.what));
+            wrong.chain(of_devices(&taken, &found)).collect()
+        },
         held: total.held,
         fail_safe: total.fail_safe,
         by_stall: total.held_by_stall + total.fail_safe_by_stall,
         writes: sum(|it| it.writes.len() as u64),
         writers: sum(|it| it.writers),
-        by_two: sum(|it| it.by_two),
-        unproved: found.iter().map(|it| it.unproved).sum(),
+        by_two: sum(|it| it.by_two.len() as u64),
+        unproved: found.iter().map(|it| it.unproved.len() as u64).sum(),
         unrecorded: found.iter().map(|it| it.unrecorded).sum(),
         input_alarms: programs.iter().map(|it| it.input_alarms).sum(),
         longest_gap_cycles: longest as f64 / period.as_nanos() as f64,
+        slowest_answer_cycles: slowest as f64 / period.as_nanos() as f64,
     })
 }
 
 fn answer(rows: &[Row]) -> Answer {
     let mut text = format!(
-        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12}\n",
+        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12} {:>15}\n",
         "fault",
         "count",
         "wrong",
@@ -396,12 +449,13 @@ fn answer(rows: &[Row]) -> Answer {
         "unproved",
         "unrecorded",
         "input alarms",
-        "longest gap"
+        "longest gap",
+        "slowest answer"
     );
     for row in rows {
         let _ = writeln!(
             text,
-            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12.1}",
+            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12.1} {:>15.1}",
             row.fault,
             row.count,
             row.wrong,
@@ -414,13 +468,14 @@ fn answer(rows: &[Row]) -> Answer {
             row.unproved,
             row.unrecorded,
             row.input_alarms,
-            row.longest_gap_cycles
+            row.longest_gap_cycles,
+            row.slowest_answer_cycles
         );
         for violation in &row.violations {
             let _ = writeln!(text, "    {violation}");
         }
     }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nthe longest gap is that between two writes to the devices of a program, in periods\n");
+    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
     let is_right =
         |row: &Row| (row.wrong, row.by_two, row.unproved, row.input_alarms) == (0, 0, 0, 0);
     let passed = rows.iter().all(is_right);

@@ -3,6 +3,9 @@
 //! A step at cycle t is meant to be felt first by cycle t. It is armed when cycle t-1 was decided, which its remote I/Os do at the
 //! deadline, and done at once, or later by its phase. Where no cycle is reported any more (nobody is there to pace, or no
 //! remote I/O to report), the period counts on.
+//!
+//! Invariant: no step is done before one of an earlier cycle. A laboratory that is late learns of several cycles at once, and phases would order their steps
+//! otherwise: a station that continues before it is stopped stays stopped.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -25,6 +28,10 @@ pub(super) struct Steps {
     waiting: VecDeque<Fault>,
     /// In the order of their times.
     armed: Vec<(Instant, Fault)>,
+    /// The newest cycle with a step that was armed, and when all steps of earlier cycles are done.
+    last: Option<(u64, Instant)>,
+    /// When the last step that was armed is done.
+    done: Option<Instant>,
     newest: Option<(u64, Instant)>,
 }
 
@@ -34,6 +41,8 @@ impl Steps {
             period,
             waiting: scenario.steps.iter().copied().collect(),
             armed: Vec::new(),
+            last: None,
+            done: None,
             newest: None,
         }
     }
@@ -66,10 +75,20 @@ impl Conductor for Steps {
             } else {
                 Duration::ZERO
             };
-            self.armed.push((now + after, *step));
+            let earlier = match self.last {
+                Some((cycle, earlier)) if cycle == step.at_cycle => earlier,
+                _ => self.done.unwrap_or(now),
+            };
+            self.last = Some((step.at_cycle, earlier));
+            let due = earlier.max(now + after);
+            self.done = self.done.max(Some(due));
+            self.armed.push((due, *step));
             self.waiting.pop_front();
         }
-        self.armed.sort_by_key(|(due, _)| *due);
+        self.armed.sort_by(|(due, one), (later, other)| {
+            let cycles = one.at_cycle.cmp(&other.at_cycle);
+            due.cmp(later).then(cycles).then(one.phase.total_cmp(&other.phase))
+        });
     }
 
     fn next_due(&self) -> Option<Instant> {
@@ -131,6 +150,18 @@ mod tests {
         let later = now + PERIOD.mul_f64(0.86);
         assert_eq!(steps.take_due(later).map(|step| step.at_cycle), Some(7));
         assert!(!steps.wait_for_time());
+    }
+
+    /// Steps of cycles that are reported at once: their order is that of the cycles, and within one that of the phases.
+    #[test]
+    fn a_laboratory_that_is_late_keeps_the_order_of_the_cycles() {
+        let now = Instant::now();
+        let mut steps = steps(&[(5, 0.9), (5, 0.2), (7, 0.1), (7, 0.0), (8, 0.0)]);
+        steps.follow(Some(20), now);
+        let later = now + PERIOD * 2;
+        let taken = std::iter::from_fn(|| steps.take_due(later));
+        let taken: Vec<(u64, f64)> = taken.map(|step| (step.at_cycle, step.phase)).collect();
+        assert_eq!(taken, [(5, 0.2), (5, 0.9), (7, 0.0), (7, 0.1), (8, 0.0)]);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Whether it is reported that two input modules show different values, as seen from the modules and not from the remote I/Os.
 //!
 //! An author of which the other remote I/O is received reports after `discrepancy_cycles` samples. Faults between the two delay that, so the bound is
-//! longer; where it reports the loss of the other one, there is nothing to compare.
+//! longer; where it reports the loss of the other one, there is nothing to compare. What was reported stays so until the two have shown the same value, or
+//! the operator has released them.
 
 use understudy_remote_io::{Event, PairSettings, PairedInput, Settings, Wiring};
 use understudy_wire::{Image, Member, Part};
@@ -9,6 +10,9 @@ use understudy_wire::{Image, Member, Part};
 /// Samples after `discrepancy_cycles` within which the report must come: those until the loss of the other remote I/O is reported, and those of faults
 /// that are over.
 const PATIENCE: u32 = 150;
+
+/// Samples by which what was read of the other remote I/O may be older than what its modules show.
+const READ_LATE: u32 = 3;
 
 #[derive(Debug, Clone, Hash)]
 pub(crate) struct InputReports {
@@ -26,6 +30,10 @@ struct Watched {
     /// Samples in a row for which the two modules have shown different values.
     differs_for: u32,
     is_reported: bool,
+    /// Samples since the report.
+    reported_for: u32,
+    /// Samples since the two have shown the same value, or were released.
+    unequal_for: u32,
 }
 
 impl InputReports {
@@ -48,8 +56,13 @@ impl InputReports {
         self.inputs.iter_mut().for_each(|watched| watched.differs_for = 0);
     }
 
+    /// The operator releases all modules.
+    pub(crate) fn release(&mut self) {
+        self.inputs.iter_mut().for_each(|watched| watched.unequal_for = 0);
+    }
+
     /// Takes an event of a remote I/O of the program, where its modules and those of the other one show these values. An input, by its first bit, of which it
-    /// should have been reported that they differ.
+    /// should have been reported that they differ, or still be.
     pub(crate) fn note(
         &mut self,
         paired: &[PairedInput],
@@ -61,7 +74,16 @@ impl InputReports {
             Event::InputsDiffer { input, .. } | Event::InputExcluded { input, .. } => {
                 self.report(paired, *input, true);
             }
-            Event::InputsAgree { input, .. } => self.report(paired, *input, false),
+            Event::InputsAgree { input, .. } => {
+                let of = paired.iter().zip(&self.inputs).find(|(of, _)| of.place.bit == *input);
+                let is_unequal = of.is_some_and(|(of, watched)| {
+                    of.place.get(shown[0]) != of.place.get(shown[1])
+                        && watched.is_reported
+                        && watched.unequal_for > watched.reported_for.saturating_add(READ_LATE)
+                });
+                self.report(paired, *input, false);
+                return is_unequal.then_some(*input);
+            }
             Event::PartnerLost { .. } => self.partner_is_lost = true,
             Event::PartnerReceived { .. } => {
                 self.partner_is_lost = false;
@@ -69,7 +91,9 @@ impl InputReports {
             }
             Event::PartChanged { part: Part::Author, .. } => {
                 self.partner_is_lost = false;
-                self.inputs.fill(Watched::default());
+                for watched in &mut self.inputs {
+                    *watched = Watched { unequal_for: watched.unequal_for, ..Watched::default() };
+                }
             }
             Event::Sampled { .. } => {
                 if self.author.replace(member) != Some(member) {
@@ -85,11 +109,17 @@ impl InputReports {
     fn report(&mut self, paired: &[PairedInput], input: u16, is_reported: bool) {
         let all = paired.iter().zip(&mut self.inputs);
         for (_, watched) in all.filter(|(of, _)| of.place.bit == input) {
-            *watched = Watched { differs_for: 0, is_reported };
+            let unequal_for = watched.unequal_for;
+            *watched = Watched { differs_for: 0, is_reported, reported_for: 0, unequal_for };
         }
     }
 
     fn sampled(&mut self, paired: &[PairedInput], [first, twin]: [&Image; 2]) -> Option<u16> {
+        for (input, watched) in paired.iter().zip(&mut self.inputs) {
+            let differs = input.place.get(first) != input.place.get(twin);
+            watched.unequal_for = if differs { watched.unequal_for.saturating_add(1) } else { 0 };
+            watched.reported_for = watched.reported_for.saturating_add(1);
+        }
         if self.partner_is_lost {
             self.begin_again();
             return None;
@@ -97,7 +127,7 @@ impl InputReports {
         let patience = self.patience;
         let mut unreported = None;
         for (input, watched) in paired.iter().zip(&mut self.inputs) {
-            let differs = input.place.get(first) != input.place.get(twin);
+            let differs = watched.unequal_for > 0;
             watched.differs_for = if differs { watched.differs_for + 1 } else { 0 };
             if watched.differs_for > patience && !watched.is_reported {
                 watched.differs_for = 0;
@@ -119,8 +149,13 @@ mod tests {
     const FIRST: Member = Member::RemoteIo(ProgramId(0));
     const TWIN: Member = Member::Twin(ProgramId(0));
 
-    /// An input whose modules differ from the first sample on; the events come after these samples.
+    /// An input whose modules differ from the first sample on; the events come before these samples.
     fn check(events: &[(u32, Event)], expected: Option<u32>) {
+        check_released(events, None, expected);
+    }
+
+    /// The same where the operator releases the modules before a sample.
+    fn check_released(events: &[(u32, Event)], released: Option<u32>, expected: Option<u32>) {
         let place = PointPlace { bit: 0, of: Elementary::Bool };
         let paired = PairedInput::exact(&[place]);
         let mut reports = InputReports {
@@ -140,8 +175,12 @@ mod tests {
             change: None,
         };
         for sample in 1..40 {
+            if released == Some(sample) {
+                reports.release();
+            }
             for (_, event) in events.iter().filter(|(after, _)| *after == sample) {
-                assert_eq!(reports.note(&paired, FIRST, event, [&off, &on]), None);
+                let input = reports.note(&paired, FIRST, event, [&off, &on]);
+                found = found.or(input.map(|_| sample));
             }
             let input = reports.note(&paired, FIRST, &sampled, [&off, &on]);
             found = found.or(input.map(|_| sample));
@@ -163,7 +202,11 @@ mod tests {
         check(&[(5, differ.clone())], None);
         check(&[(11, excluded)], None);
         check(&[(5, other)], Some(11));
-        check(&[(5, differ.clone()), (7, agree)], Some(17));
+        // The two have not agreed, so the report must not end, also where the other one is lost.
+        check(&[(5, differ.clone()), (9, agree.clone())], Some(9));
+        check(&[(5, differ.clone()), (7, lost.clone()), (9, agree.clone())], Some(9));
+        // The operator has released them, and it is reported anew.
+        check_released(&[(5, differ.clone()), (9, agree)], Some(9), Some(19));
         // Where the other one is lost there is nothing to compare, and a new author reports anew.
         check(&[(5, lost.clone())], None);
         check(&[(5, lost), (15, back)], Some(25));

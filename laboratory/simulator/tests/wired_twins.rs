@@ -176,6 +176,51 @@ fn a_stuck_input_module_is_excluded_and_never_the_other_one() {
     assert_eq!((alarms, exclusions), (18, 3));
 }
 
+/// A stuck module that no edge has excluded yet: the alarm lasts while the other remote I/O is down and when it is back, and an author that takes over raises
+/// it anew. The referee finds a report that ends while the modules differ.
+#[test]
+fn a_doubt_lasts_without_the_other_one_and_over_a_switchover() {
+    let doubted = |outcome: &Outcome| {
+        let told: Vec<_> = outcome.told.iter().map(|(_, event)| event).collect();
+        matches!(told[..], [Event::InputsDiffer { .. }])
+    };
+    let mut doubts = 0;
+    for (input, member, value) in (0..5).flat_map(|input| {
+        [FIRST, TWIN].into_iter().flat_map(move |it| [false, true].map(|value| (input, it, value)))
+    }) {
+        let stuck = [(100, member, input, Some(value))];
+        if !doubted(&run(parts(1), &[], &stuck, 300)) {
+            continue;
+        }
+        doubts += 1;
+        // The intact one is alone and goes on; its plant may move then, and the stuck one is back.
+        let other = if member == FIRST { TWIN } else { FIRST };
+        for lost in [member, other] {
+            let faults =
+                [fault(300, 0.3, lost, Action::Crash), fault(400, 0.3, lost, Action::Restart)];
+            let outcome = run(parts(1), &faults, &stuck, 700);
+            let mut told = outcome.told.iter().filter(|(cycle, _)| *cycle >= 300);
+            let switched = outcome.simulation.author(ROBOT) == Some(TWIN);
+            assert_eq!(switched, lost == FIRST, "{input} {member:?} {value}");
+            let first = told.find(|(_, it)| !matches!(it, Event::PartnerLost { .. }));
+            let is_right = match first {
+                // A new author says it at once.
+                Some((cycle, Event::InputsDiffer { input: of, .. })) => {
+                    switched && *cycle < 310 && *of == input
+                }
+                Some((cycle, event)) => {
+                    let is_over =
+                        matches!(event, Event::InputsAgree { .. } | Event::InputExcluded { .. });
+                    !switched && *cycle >= 400 && is_over
+                }
+                None => !switched,
+            };
+            assert!(is_right, "{input} {member:?} {value} {lost:?}: {:?}", outcome.told);
+        }
+    }
+    assert!(doubts > 5, "{doubts}");
+}
+
 /// What the author has excluded stays excluded where the other one takes over, until an operator releases it.
 #[test]
 fn an_exclusion_lasts_until_it_is_released() {

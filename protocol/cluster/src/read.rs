@@ -36,6 +36,7 @@
 //! | U0255 | warning: a mark of what is to be filled in |
 //! | U0256 | warning: inputs that nothing drives |
 //! | U0258 | warning: a watchdog of a simulated plant that runs out before the twin has taken over |
+//! | U0262 | warning: a twin on the machine of its remote I/O |
 
 mod alarms;
 mod devices;

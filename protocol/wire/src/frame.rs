@@ -387,8 +387,9 @@ pub enum Modules {
         outputs: Option<Image>,
         /// [`Pair::sent`] of the newest frame of the other one: the outputs were sent later.
         answers: Option<Time>,
-        /// Inputs, by their first bits, whose module is excluded: at the first remote I/O, and at the twin.
-        excluded: [Image; 2],
+        /// Inputs, by their first bits, whose module is not trusted, at the first remote I/O and at the twin: at one of them where it is excluded, at both
+        /// where they differ for too long.
+        distrusted: [Image; 2],
     },
     /// The other one.
     Follower {

@@ -346,6 +346,7 @@ impl RemoteIo {
         self.trust = Trust::default();
         self.differed.clear();
         self.give_up_field();
+        self.note_distrusted();
         self.release_modules();
         self.report_part();
     }

@@ -1,8 +1,11 @@
 //! Whole plans: ranked, packed, explained.
 
+use std::time::Duration;
+
 use understudy_allocation::{
-    Allocation, AllocationError, Catalogue, Figure, Item, Need, Options, Preference, Provenance,
-    Quantity, Role, Statement, Stock, Terms, Verdict, Verification, allocate, csv, html, text,
+    Allocation, AllocationError, Catalogue, Figure, Group, Item, Member, Need, Options, Preference,
+    Provenance, Quantity, Role, Statement, Stock, Terms, Twin, Verdict, Verification, allocate,
+    csv, html, text,
 };
 
 use crate::support::{catalogue, controller, resources};
@@ -285,4 +288,65 @@ fn a_bill_counts_every_box() {
     assert!(!shown.contains("price without"), "{shown}");
     let (found, _) = rows(&three_sizes(), &items[..3]);
     assert_eq!(found, [], "without remote I/Os it is not a cell");
+}
+
+/// The terminals of a program are wired once where its twin has none of its own, and twice where it has: so is their price.
+#[test]
+fn a_twin_at_the_device_of_the_first_one_has_no_terminals() {
+    let source = "a list".to_owned();
+    let priced = |model: &str, points: u64, price: u64| {
+        let mut priced = controller(
+            model,
+            &[
+                (MEMORY, 100_000),
+                (Quantity::DataMemoryBytes, 10_000),
+                (Quantity::BoolInstructionNs, 100),
+                (Quantity::DigitalInputs, points),
+                (Quantity::DigitalOutputs, points),
+                (Quantity::Price, price),
+            ],
+        );
+        let currency = Figure { value: "EUR".to_owned(), source: source.clone() };
+        priced.texts.insert(Statement::Currency, currency);
+        let ports = Figure { value: "Ethernet".to_owned(), source: source.clone() };
+        priced.texts.insert(Statement::CommPorts, ports);
+        priced
+    };
+    let catalogue = catalogue(vec![priced("none", 0, 10_000), priced("wired", 8, 50_000)]);
+    let check = |has_terminals: bool, twin: u64, model: &str| {
+        let text = "program p\ninput a\ninput b\noutput y\nmemory m\nrung [ a | m ] /b ( m )\n";
+        let passed = Verification::Passed("proved".to_owned());
+        let member = Member {
+            name: "press".to_owned(),
+            program: resources(text),
+            verification: passed.clone(),
+            remote_io: "press-io".to_owned(),
+            twin: Some(Twin { name: "press-io-2".to_owned(), has_terminals }),
+        };
+        let group = Group {
+            members: vec![member],
+            understudies: vec!["understudy".to_owned()],
+            understudy: resources(text),
+            parity: passed,
+            period: Duration::from_millis(10),
+        };
+        let options = Options { networks: 2, ..Options::default() };
+        let plan = allocate(&catalogue, &group.items(0), &options).expect("a plan");
+        let expected = [
+            "none: press".to_owned(),
+            "none: understudy".to_owned(),
+            format!("{model}: press-io-2"),
+            "wired: press-io".to_owned(),
+        ];
+        let mut found = boxes(&plan);
+        found.sort_by_key(|it| expected.iter().position(|one| one == it));
+        assert_eq!(found, expected);
+        let prices: Vec<_> =
+            plan.bill.iter().map(|row| row.price.as_ref().map(|it| it.hundredths)).collect();
+        let redundant = 2 * 10_000 + 2 * 50_000;
+        let cell = 2 * 10_000 + 50_000 + twin;
+        assert_eq!(prices, [Some(cell), Some(cell), Some(redundant)], "{has_terminals}");
+    };
+    check(false, 10_000, "none");
+    check(true, 50_000, "wired");
 }

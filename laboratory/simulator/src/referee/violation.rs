@@ -87,7 +87,7 @@ pub enum Violation {
         /// What they drive.
         driven: Image,
     },
-    /// The two modules of an input have shown different values for long, and no remote I/O has reported it.
+    /// The two modules of an input have shown different values for long, and no remote I/O has reported it, or the report has ended meanwhile.
     #[error(
         "in cycle {moment} the modules of the input at bit {input} show different values for too long, and it is not reported"
     )]

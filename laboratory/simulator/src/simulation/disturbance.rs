@@ -50,6 +50,9 @@ impl Simulation {
             (_, Action::Change { step }) => self.change(member, step, observe),
             (Member::RemoteIo(program) | Member::Twin(program), Action::Release) => {
                 self.referees[program.index()].operator_chooses();
+                if let Some(reports) = &mut self.input_reports[program.index()] {
+                    reports.release();
+                }
                 self.give(member, Input::RemoteIo(RemoteIoInput::Release), observe);
             }
             (Member::RemoteIo(program) | Member::Twin(program), Action::Choose { choice }) => {

@@ -201,7 +201,7 @@ mod tests {
                 modules: Some(Modules::Author {
                     outputs: Some(ones(bits)),
                     answers: latest,
-                    excluded: [ones(bits), ones(bits)],
+                    distrusted: [ones(bits), ones(bits)],
                 }),
             };
             check_body(Member::Twin(ProgramId(63)), Body::Pair(pair), modules_bytes(bits, bits));

@@ -26,6 +26,7 @@ pub(super) fn read(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Twin> {
     names.listen(&section.addresses, diagnostics);
+    check_host(&section, remote_io, diagnostics);
     check_keys(&section, diagnostics);
     let (paired_inputs, device) = if section.is_parallel {
         check_outputs(&section, remote_io, member, diagnostics);
@@ -48,6 +49,25 @@ pub(super) fn read(
         field: device,
         addresses: section.addresses.map(|address| address.value),
     })
+}
+
+/// Warns of two remote I/Os of a program on one machine.
+fn check_host(section: &TwinSection, first: &RemoteIo, diagnostics: &mut Vec<Diagnostic>) {
+    let own = section.addresses.as_ref();
+    let pairs = [(own.first, first.addresses.first), (own.second, first.addresses.second)];
+    for (own, first) in pairs {
+        let (Some(own), Some(first)) = (own, first) else {
+            continue;
+        };
+        let host = own.value.ip().to_canonical();
+        if host == first.ip().to_canonical() && !host.is_loopback() {
+            let message = format!("the twin and its remote I/O are both at {host}");
+            let help = "run the twin on another machine, with another power supply: what stops one machine stops both";
+            let found = Diagnostic::warning("U0262", message, own.span.clone());
+            diagnostics.push(found.with_help(help));
+            return;
+        }
+    }
 }
 
 /// Reports keys of the other wiring.

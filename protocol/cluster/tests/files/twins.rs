@@ -34,6 +34,17 @@ fn twins() {
     assert!(check(taken, &tcp, "").contains("U0208"));
     let address = named(", address = \"10.0.1.11:7450\"");
     assert!(check(&address, &tcp, "").contains("U0210"));
+    // One machine is no second one.
+    let placed = |first: &str, twin: &str| {
+        let table = format!("address = \"{first}:7450\"\n{tcp}");
+        check(&named(&format!(", address = \"{twin}:7460\"")), &table, "")
+    };
+    let found = placed("10.0.1.21", "10.0.1.21");
+    assert!(found.contains("U0262") && found.contains("both at 10.0.1.21"), "{found}");
+    for (first, twin) in [("10.0.1.21", "10.0.1.22"), ("127.0.0.1", "127.0.0.1")] {
+        let found = placed(first, twin);
+        assert!(!found.contains("U0262") && !found.contains("error"), "{found}");
+    }
     for key in ["author = true", "direct = \"10.0.1.61:7450\""] {
         let found = check(&named(&format!(", {key}")), &tcp, "");
         assert!(

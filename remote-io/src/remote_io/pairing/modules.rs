@@ -32,8 +32,8 @@ pub(super) struct Modules {
     driven: Option<Image>,
     /// Outputs that this follower drives.
     followed: Option<Followed>,
-    /// Excluded modules, at the first remote I/O and at the twin, as the author has them.
-    excluded: [Image; 2],
+    /// Modules that are not trusted, at the first remote I/O and at the twin, as the author has them.
+    distrusted: [Image; 2],
     /// When the newest frame of the other one was sent, on its clock.
     answers: Option<Time>,
 }
@@ -64,7 +64,7 @@ impl Modules {
         let inputs = PairedInputs::new(&settings.paired_inputs, settings.undriven.clone());
         Some(Self {
             discrepancy_cycles,
-            excluded: inputs.excluded(&settings.paired_inputs),
+            distrusted: inputs.distrusted(&settings.paired_inputs),
             inputs,
             theirs: None,
             driven: None,
@@ -126,7 +126,7 @@ impl RemoteIo {
         read
     }
 
-    /// The operator releases all modules that were excluded.
+    /// The operator releases all modules that were excluded or in doubt.
     pub(in crate::remote_io) fn release_inputs(&mut self) {
         if let Some(modules) = self.pairing.as_mut().and_then(|it| it.modules.as_mut()) {
             modules.inputs.release(&self.settings.paired_inputs);
@@ -153,7 +153,7 @@ impl RemoteIo {
         }
     }
 
-    /// Begins as the author: with the inputs that were sampled last, and the modules that were excluded.
+    /// Begins as the author: with the inputs that were sampled last, and the modules that were excluded or in doubt.
     pub(super) fn take_over_modules(&mut self) {
         let paired = &self.settings.paired_inputs;
         let Some(pairing) = &mut self.pairing else {
@@ -165,7 +165,7 @@ impl RemoteIo {
             return;
         };
         modules.inputs = PairedInputs::new(paired, last);
-        modules.inputs.exclude(paired, &modules.excluded);
+        modules.inputs.distrust(paired, &modules.distrusted);
         modules.followed = None;
         modules.driven = None;
         self.report_inputs();
@@ -180,13 +180,19 @@ impl RemoteIo {
         }
     }
 
+    /// An author that ends to be one knows best which modules are not trusted, until it receives the next author.
+    pub(super) fn note_distrusted(&mut self) {
+        if let Some(modules) = self.pairing.as_mut().and_then(|it| it.modules.as_mut()) {
+            modules.distrusted = modules.inputs.distrusted(&self.settings.paired_inputs);
+        }
+    }
+
     /// The modules of this remote I/O drive nothing until the author is received.
     pub(super) fn release_modules(&mut self) {
         let released = Image::zero(self.settings.fail_safe.width());
         let Some(modules) = self.pairing.as_mut().and_then(|it| it.modules.as_mut()) else {
             return;
         };
-        modules.excluded = modules.inputs.excluded(&self.settings.paired_inputs);
         modules.driven = None;
         modules.followed = None;
         self.member.put(Output::Follow(released));
@@ -223,7 +229,7 @@ impl RemoteIo {
             Part::Author => Sent::Author {
                 outputs: modules.driven.take(),
                 answers: modules.answers,
-                excluded: modules.inputs.excluded(&self.settings.paired_inputs),
+                distrusted: modules.inputs.distrusted(&self.settings.paired_inputs),
             },
             Part::Follower | Part::TakingOver => {
                 Sent::Follower { inputs: self.sensors.clone(), follows: modules.followed.is_some() }
@@ -251,11 +257,11 @@ impl RemoteIo {
                 let inputs = readings.clone().filter(|image| image.width() == inputs);
                 modules.theirs = Some(Readings { inputs, at: now, is_new: true });
             }
-            Sent::Author { outputs: driven, answers, excluded }
+            Sent::Author { outputs: driven, answers, distrusted }
                 if pairing.part != Part::Author && is_present(*answers) =>
             {
-                if excluded.iter().all(|image| image.width() == inputs) {
-                    modules.excluded.clone_from(excluded);
+                if distrusted.iter().all(|image| image.width() == inputs) {
+                    modules.distrusted.clone_from(distrusted);
                 }
                 let is_newer =
                     modules.followed.as_ref().is_none_or(|before| theirs.sent > before.sent);
