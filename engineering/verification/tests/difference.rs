@@ -161,7 +161,7 @@ struct Pair {
 impl Pair {
     fn new(old: Program, new: Program) -> Self {
         let engines = [Interpreter::new(&old), Interpreter::new(&new)];
-        let successor = Successor::new(&old, &new, &HashMap::new());
+        let successor = Successor::new(&old, &new, &HashMap::new(), Vec::new());
         Self { old, new, engines, successor }
     }
 
