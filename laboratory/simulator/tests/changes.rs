@@ -234,6 +234,23 @@ fn a_change_is_undone() {
     assert_eq!(runs, [1, 10, 1, 10, 1]);
 }
 
+/// A remote I/O that starts again in the middle of a change does not know of which program the history is that it adopts. Where the change does not touch its
+/// program, that is no matter: the change ends.
+#[test]
+fn a_change_ends_although_a_remote_io_was_restarted_meanwhile() {
+    for (remote_io, begin) in [(0, 30), (0, 45), (1, 30), (1, 45), (1, 65)] {
+        let remote_io = Member::RemoteIo(ProgramId(remote_io));
+        let mut faults = whole_change(20);
+        faults.push(at(begin, 0.5, remote_io, Action::Crash));
+        faults.push(at(begin + 5, 0.5, remote_io, Action::Restart));
+        let (simulation, seen) = run(&faults, 150);
+        assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+        assert_eq!((seen.cold_starts, seen.not_prepared), (0, 0));
+        // Each member prepares, accepts and forgets.
+        assert_eq!(seen.configured, 15, "{remote_io:?} from cycle {begin} on");
+    }
+}
+
 /// The count has another name in the new program and goes on by a pair of its file, at the switch and on the way back, while stations die; with the
 /// same pair in the file of the change after it, it goes on too.
 #[test]

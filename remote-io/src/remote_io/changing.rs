@@ -139,8 +139,7 @@ impl RemoteIo {
         if let Some(refusal) = self.refusal_of_trial(order) {
             return self.member.put(Output::Obeyed(Err(refusal)));
         }
-        let own = self.hash();
-        let may_forget = self.knowledge.run().is_none_or(|run| run.history.is_of(own));
+        let may_forget = self.has_history_of_own();
         let before = self.member.changing().change().cloned();
         self.member.take_change(now, order, may_forget);
         let changing = self.member.changing();
@@ -149,6 +148,17 @@ impl RemoteIo {
             self.adopt(&change, own);
             self.replacing = Replacing::default();
         }
+    }
+
+    /// Whether its history is one of the program of its configuration alone. So is that of a program that the change does not replace, also where this
+    /// remote I/O was restarted and does not know of which program the history is that it has adopted.
+    fn has_history_of_own(&self) -> bool {
+        let change = self.member.changing().change();
+        if change.is_some_and(|change| change.of(self.settings.program).is_none()) {
+            return true;
+        }
+        let own = self.hash();
+        self.knowledge.run().is_none_or(|run| run.history.is_of(own))
     }
 
     /// A program that is on trial is not accepted yet, and one that was taken back is not accepted at all.
