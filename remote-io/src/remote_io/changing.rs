@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use understudy_cycle::{ChangeOrder, OnlineChange, Output};
 use understudy_wire::{
-    ChangeName, ConfigurationHash, Configurations, Header, OrderRefusal, ProgramHash, StationId,
-    StationSet, Time,
+    ChangeName, ConfigurationHash, Configurations, Header, Holding, OrderRefusal, ProgramHash,
+    StationId, StationSet, Time,
 };
 
 use super::{Execution, RemoteIo};
@@ -118,6 +118,19 @@ impl RemoteIo {
             self.replacing.prepared.insert(station);
         } else {
             self.replacing.prepared.remove(station);
+        }
+    }
+
+    /// Learns of which program the history is that was adopted: a station that runs the configuration of this remote I/O, and has loaded no other one, holds
+    /// a state of the program in it.
+    pub(super) fn learn_program(&mut self, header: &Header, holdings: &[Holding]) {
+        let runs = header.configuration == self.configurations().own && header.prepared.is_none();
+        let Some(holding) = Holding::of(holdings, self.settings.program).filter(|_| runs) else {
+            return;
+        };
+        let own = self.hash();
+        if let Some(run) = self.knowledge.run_mut() {
+            run.history.learn(own, holding.lineage);
         }
     }
 
