@@ -48,7 +48,7 @@ pub(super) struct Totals {
     pub(super) fail_safe: u64,
     /// Deadlines at which the remote I/O was down.
     pub(super) missed: u64,
-    /// Held and fail-safe deadlines during host stalls.
+    /// Held and fail-safe deadlines during host stalls, which are none of the others.
     pub(super) by_stall: u64,
 }
 
