@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum, value_parser};
 use serde_json::{Value, json};
 use understudy_cluster::{
-    ChangeTexts, ChangedInitial, Cluster, NeedsStop, Overrides, changed_initials, fates,
+    ChangeTexts, ChangedInitial, Cluster, NeedsStop, Overrides, changed_initials, done_pairs, fates,
 };
 use understudy_text::duration::parse_positive;
-use understudy_typed::{CarriedPath, Fate};
+use understudy_typed::{CarriedPath, Fate, Renamed};
 use understudy_view::Run;
 use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal};
 
@@ -257,15 +257,26 @@ fn pause() {
 }
 
 fn needs_stop(reasons: &[NeedsStop]) -> Answer {
-    let mut answer = Answer::failed(
-        Status::BadInput,
-        "U0630",
-        "the change needs a stop, since an online change replaces programs only: make these settings equal in both files, or stop the cluster and start all members with the new file".to_owned(),
-    );
-    for reason in reasons {
-        answer = answer.and_failure(Status::BadInput, "U0630", reason.to_string());
-    }
-    answer
+    let of = |code: &'static str| reasons.iter().filter(move |reason| reason.code() == code);
+    let groups = [
+        (
+            "U0630",
+            "the change needs a stop, since an online change replaces programs only: make these settings equal in both files, or stop the cluster and start all members with the new file",
+        ),
+        ("U0637", "variables cannot be renamed so: correct `renamed` of the new file"),
+    ];
+    let groups = groups.into_iter().filter(|(code, _)| of(code).next().is_some());
+    let messages = groups.flat_map(|(code, words)| {
+        let own = of(code).map(move |reason| (code, reason.to_string()));
+        std::iter::once((code, words.to_owned())).chain(own)
+    });
+    let answer = messages.fold(None, |answer: Option<Answer>, (code, message)| {
+        Some(match answer {
+            Some(answer) => answer.and_failure(Status::BadInput, code, message),
+            None => Answer::failed(Status::BadInput, code, message),
+        })
+    });
+    answer.expect("a reason")
 }
 
 /// What members said, by name.
@@ -347,6 +358,8 @@ struct PlannedProgram {
     name: String,
     paths: Vec<CarriedPath>,
     initials: Vec<ChangedInitial>,
+    /// Pairs that rename nothing any more.
+    done: Vec<Renamed>,
 }
 
 impl Plan {
@@ -356,7 +369,8 @@ impl Plan {
             let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
             let paths = fates(&old.code, &new.code);
             let initials = changed_initials(&old.code, &new.code, &paths);
-            PlannedProgram { name: new.name.clone(), paths, initials }
+            let done = done_pairs(&old.code, &new.code);
+            PlannedProgram { name: new.name.clone(), paths, initials, done }
         });
         Self { programs: programs.collect() }
     }
@@ -386,7 +400,7 @@ impl Plan {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        for PlannedProgram { name, paths, initials } in &self.programs {
+        for PlannedProgram { name, paths, initials, done } in &self.programs {
             let count = |fate| paths.iter().filter(|path| path.fate == fate).count();
             let _ = writeln!(
                 text,
@@ -397,13 +411,17 @@ impl Plan {
                 count(Fate::New),
                 count(Fate::Dropped)
             );
-            for path in paths.iter().filter(|path| path.fate != Fate::Kept) {
+            let is_told =
+                |path: &&CarriedPath| path.fate != Fate::Kept || path.renamed_from.is_some();
+            for path in paths.iter().filter(is_told) {
                 let types = match (&path.before, &path.now) {
                     (Some(before), Some(now)) if before != now => format!("{before} to {now}"),
                     (Some(of), _) | (None, Some(of)) => of.clone(),
                     (None, None) => String::new(),
                 };
-                let _ = writeln!(text, "  {:<9}  {}  {types}", path.fate.name(), path.path);
+                let was = path.renamed_from.as_ref();
+                let was = was.map(|name| format!(", renamed from `{name}`")).unwrap_or_default();
+                let _ = writeln!(text, "  {:<9}  {}  {types}{was}", path.fate.name(), path.path);
             }
             for initial in initials {
                 let values = initial.values.as_ref();
@@ -415,33 +433,42 @@ impl Plan {
                     initial.path
                 );
             }
+            for (before, now) in done {
+                let _ = writeln!(
+                    text,
+                    "  `{before}` is not renamed to `{now}`: the program before has `{now}`, which keeps its value"
+                );
+            }
         }
         text.trim_end().to_owned()
     }
 
     fn json(&self) -> Value {
-        let programs = self.programs.iter().map(|PlannedProgram { name, paths, initials }| {
-            let paths = paths.iter().map(|path| {
+        let programs =
+            self.programs.iter().map(|PlannedProgram { name, paths, initials, done }| {
+                let paths = paths.iter().map(|path| {
+                    json!({
+                        "path": path.path,
+                        "fate": path.fate.name(),
+                        "renamed_from": path.renamed_from,
+                        "before": path.before,
+                        "now": path.now,
+                    })
+                });
+                let initials = initials.iter().map(|initial| {
+                    let [before, now] = match &initial.values {
+                        Some([one, other]) => [Some(one), Some(other)],
+                        None => [None, None],
+                    };
+                    json!({ "path": initial.path, "before": before, "now": now })
+                });
                 json!({
-                    "path": path.path,
-                    "fate": path.fate.name(),
-                    "before": path.before,
-                    "now": path.now,
+                    "program": name,
+                    "paths": paths.collect::<Vec<_>>(),
+                    "initial_values": initials.collect::<Vec<_>>(),
+                    "renamed_before": done.iter().map(|(_, now)| now).collect::<Vec<_>>(),
                 })
             });
-            let initials = initials.iter().map(|initial| {
-                let [before, now] = match &initial.values {
-                    Some([one, other]) => [Some(one), Some(other)],
-                    None => [None, None],
-                };
-                json!({ "path": initial.path, "before": before, "now": now })
-            });
-            json!({
-                "program": name,
-                "paths": paths.collect::<Vec<_>>(),
-                "initial_values": initials.collect::<Vec<_>>(),
-            })
-        });
         Value::Array(programs.collect())
     }
 

@@ -65,6 +65,14 @@ impl History {
         self.program == Some(program) && self.samples.iter().all(|(step, _)| step.change.is_none())
     }
 
+    /// A station holds a state with a lineage, and it is one of this program: where that is in this history, and no sample changes the program, all are.
+    pub(crate) fn learn(&mut self, program: ProgramHash, lineage: Lineage) {
+        let is_one = self.samples.iter().all(|(step, _)| step.change.is_none());
+        if self.program.is_none() && is_one && self.place(lineage).is_some() {
+            self.program = Some(program);
+        }
+    }
+
     /// A program that continues from a lineage in the history of a sample that was received; nothing where it is not in there.
     pub(crate) fn received(sample: &Sample, lineage: Lineage, capacity: usize) -> Option<Self> {
         let mut history = Self::from(sample.born, (None, sample.base), capacity);

@@ -278,6 +278,7 @@ impl RemoteIo {
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note(station, &turn.holdings, None, &turn.recalled, frame.header.alone);
+                self.learn_program(&frame.header, &turn.holdings);
                 self.holders.hear_of(turn.heard);
                 if turn.relayed.iter().any(|one| one.program == self.settings.program) {
                     self.note_relayed();

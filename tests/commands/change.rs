@@ -97,3 +97,26 @@ fn what_is_not_followed_is_undecided_with_the_variable() {
         assert!(high["reason"].as_str().is_some_and(|why| why.contains("level")), "{high}");
     }
 }
+
+/// A value that cannot be followed through the switch takes nothing from the proof of the outputs that do not depend on it.
+#[test]
+fn a_value_that_is_not_followed_leaves_the_rest_proved() {
+    let folder = empty_folder("change_any_value");
+    let program = |of: &str, last: u32| {
+        format!(
+            "PROGRAM one\n VAR_INPUT start, stop : BOOL; END_VAR\n VAR_OUTPUT valve, full : BOOL; END_VAR\n VAR parts : {of}; wait : TON; END_VAR\n\
+             IF start THEN parts := parts + 1; END_IF;\n IF stop OR parts > {last} THEN parts := 0; END_IF;\n\
+             wait(IN := start, PT := T#50ms);\n valve := wait.Q AND NOT stop;\n full := parts = {last};\nEND_PROGRAM\n"
+        )
+    };
+    write(&folder, "old", &program("INT", 5));
+    write(&folder, "new", &program("DINT", 5));
+    let json =
+        understudy_in(&folder, &["change", "old/cluster.toml", "new/cluster.toml", "--json"])
+            .json();
+    assert_eq!(verdict(&json, "valve")["verdict"], "equal", "{json}");
+    let full = verdict(&json, "full");
+    assert_eq!(full["verdict"], "undecided", "{json}");
+    let why = full["reason"].as_str().unwrap_or_default();
+    assert!(why.contains("`parts` has another type"), "{full}");
+}

@@ -57,9 +57,16 @@ END_PROGRAM"
 }
 
 fn write_cluster(folder: &Path, counter: &str) -> String {
+    write_cluster_with(folder, counter, "")
+}
+
+/// With keys of the controller.
+fn write_cluster_with(folder: &Path, counter: &str, keys: &str) -> String {
     fs::create_dir_all(folder).expect("a folder");
     let file = folder.join("cluster.toml");
-    for (name, text) in [("cluster.toml", CLUSTER), ("counter.st", counter), ("lamp.st", LAMP)] {
+    let ladder = "ladder = \"counter.st\"";
+    let cluster = CLUSTER.replace(ladder, &format!("{ladder}\n{keys}"));
+    for (name, text) in [("cluster.toml", &*cluster), ("counter.st", counter), ("lamp.st", LAMP)] {
         fs::write(folder.join(name), text).expect("written");
     }
     file.to_str().expect("text").to_owned()
@@ -176,6 +183,49 @@ fn a_program_changes_while_stations_are_killed() {
     let counts = ended_well(child, &runs, &run);
     let steps = steps(&counts);
     assert_eq!(steps, [1, 10, 1, 10], "{steps:?}");
+}
+
+/// The count has another name in the new program. Members whose pairs are wrong load nothing; the right pair is still in the file of the next change.
+#[test]
+fn a_renamed_variable_keeps_its_value() {
+    let _one = some_at_a_time();
+    let out = empty_folder("changes-renamed");
+    let before = write_cluster(&out.join("before"), &counter("INT", 1));
+    let renamed =
+        |step: u32| counter("INT", step).replace("count ", "total ").replace("count;", "total;");
+    let pair = "renamed = { count = \"total\" }";
+    let wrong =
+        write_cluster_with(&out.join("wrong"), &renamed(10), "renamed = { counts = \"total\" }");
+    let after = write_cluster_with(&out.join("after"), &renamed(10), pair);
+    let next = write_cluster_with(&out.join("next"), &renamed(100), pair);
+    let runs = out.join("runs");
+    let more = ["--cycles", "100000", "--allow-commands"];
+    let (child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    let mut records = Records::of(&run);
+    let run_text = run.to_str().expect("text");
+    let (exit, document, _) = answer(&["change", run_text, &wrong, "prepare"]);
+    let codes = document["failures"].as_array().expect("failures").iter();
+    assert!(exit == 2 && codes.clone().all(|it| it["code"] == "U0637"), "{document:#}");
+    let (exit, document, errors) = answer(&["change", run_text, &after]);
+    assert_eq!(exit, 0, "{document:#} {errors}");
+    let paths = document["result"]["plan"][0]["paths"].as_array().expect("paths");
+    let total = paths.iter().find(|path| path["path"] == "total").expect("it is listed");
+    assert_eq!((&total["fate"], &total["renamed_from"]), (&"kept".into(), &"count".into()));
+    for word in ["prepare", "switch", "accept"] {
+        let (exit, document, errors) = answer(&["change", run_text, &after, word]);
+        assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+    }
+    records.wait_for("the change", |record| is(record, "counter-io", "program-changed"));
+    for word in ["prepare", "accept"] {
+        let (exit, document, errors) =
+            answer(&["change", &after, &next, word, "--out", runs.to_str().expect("text")]);
+        assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+    }
+    records.wait_for("the next change", |record| is(record, "counter-io", "program-changed"));
+    let counts = ended_well(child, &runs, &run);
+    let steps = steps(&counts);
+    assert_eq!(steps, [1, 10, 100], "{steps:?}");
 }
 
 /// A new program that a fault stops in its eighth scan: it is taken back, the plant misses the cycle of the fault, and the change can be cancelled only.

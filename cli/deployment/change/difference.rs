@@ -128,7 +128,12 @@ fn outcome(
     };
     let difference = Difference::between(old.typed(), new.typed(), switch);
     let difference = difference.map_err(|error| error.to_string())?;
-    let inexact = difference.inexact().map(|inexact| inexact.to_string());
+    let any_values = difference.any_values().iter().map(ToString::to_string);
+    let any_values: Vec<String> = any_values.collect();
+    let inexact = match any_values.is_empty() {
+        true => difference.inexact().map(|inexact| inexact.to_string()),
+        false => Some(any_values.join("; ")),
+    };
     let answers = difference.check(bounds, &mut || {});
     let outputs = difference.outputs().zip(answers).map(|(name, answer)| {
         let verdict = match answer {

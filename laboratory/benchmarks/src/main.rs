@@ -2,6 +2,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures the time of this machine")]
 
+mod changes;
 mod children;
 mod exchange;
 mod failover;
@@ -40,6 +41,7 @@ Example:
   understudy-bench timing --controllers 4,16 --period 10ms --seconds 10
   understudy-bench spares --rounds 200
   understudy-bench twins --count 500
+  understudy-bench changes --count 1000
 
 Exit status: 0 if the targets are met, 1 if not, 2 for invalid input."
 )]
@@ -64,6 +66,7 @@ enum Benchmark {
     Timing(timing::Arguments),
     Spares(Box<spares::Arguments>),
     Twins(Box<twins::Arguments>),
+    Changes(Box<changes::Arguments>),
     #[command(hide = true)]
     Member(exchange::MemberArguments),
     #[command(hide = true)]
@@ -92,6 +95,7 @@ impl Benchmark {
             Self::Timing(arguments) => ("timing", timing::run(arguments, console).into()),
             Self::Timed(arguments) => ("timed", timing::run_timed(arguments)),
             Self::Spares(arguments) => ("spares", spares::run(arguments, console).into()),
+            Self::Changes(arguments) => ("changes", changes::run(arguments, console).into()),
             Self::Twins(arguments) => ("twins", twins::run(arguments, console).into()),
             Self::Member(arguments) => ("member", exchange::run_member(arguments)),
             Self::Node(arguments) => ("node", run_station(arguments).into()),

@@ -18,7 +18,8 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use understudy::{Answer, Console, Status};
 
-use group::{Group, failed};
+use group::Group;
+pub(crate) use group::failed;
 use witness::Counts;
 
 /// Kill a station and then the understudy of its group, with a spare that several groups share
@@ -240,7 +241,7 @@ fn answer(found: &Found) -> Answer {
 }
 
 /// `understudy` in the folder of this program.
-fn sibling() -> Result<PathBuf, Answer> {
+pub(crate) fn sibling() -> Result<PathBuf, Answer> {
     let own = std::env::current_exe().map_err(|error| failed("this program", &error))?;
     Ok(own.with_file_name("understudy"))
 }

@@ -71,7 +71,14 @@ const MEMBERS: [Member; 5] = [
 ];
 
 fn cluster(counter: &str) -> Cluster {
-    let loaded = read("cluster.toml", CLUSTER, &mut |name| match name {
+    cluster_with(counter, "")
+}
+
+/// With keys of the controller.
+fn cluster_with(counter: &str, keys: &str) -> Cluster {
+    let file = "ladder = \"counter.st\"";
+    let text = CLUSTER.replace(file, &format!("{file}\n{keys}"));
+    let loaded = read("cluster.toml", &text, &mut |name| match name {
         "counter.st" => Ok(counter.to_owned()),
         _ => Ok(LAMP.to_owned()),
     });
@@ -91,10 +98,13 @@ fn changing() -> Parts {
 }
 
 fn changing_between(before: &str, after: &str) -> Parts {
-    let (before, after) = (cluster(before), cluster(after));
-    let texts = ChangeTexts::between(&before, &after).expect("only a program differs");
-    let change = texts.load(&before).expect("it is of this cluster");
-    Parts { change: Some(Arc::new(change)), ..parts(&before) }
+    changing_clusters(&cluster(before), &cluster(after))
+}
+
+fn changing_clusters(before: &Cluster, after: &Cluster) -> Parts {
+    let texts = ChangeTexts::between(before, after).expect("only a program differs");
+    let change = texts.load(before).expect("it is of this cluster");
+    Parts { change: Some(Arc::new(change)), ..parts(before) }
 }
 
 fn at(cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
@@ -222,6 +232,55 @@ fn a_change_is_undone() {
     let mut runs: Vec<i32> = steps.collect();
     runs.dedup();
     assert_eq!(runs, [1, 10, 1, 10, 1]);
+}
+
+/// A remote I/O that starts again in the middle of a change does not know of which program the history is that it adopts. Where the change does not touch its
+/// program, that is no matter; else stations that have ended the change already tell it. So the change ends.
+#[test]
+fn a_change_ends_although_a_remote_io_was_restarted_meanwhile() {
+    for (remote_io, begin) in [(0, 30), (0, 45), (0, 79), (1, 30), (1, 45), (1, 65), (1, 79)] {
+        let remote_io = Member::RemoteIo(ProgramId(remote_io));
+        let mut faults = whole_change(20);
+        // It has adopted the history before it takes the next order.
+        let is_early = |fault: &Fault| (begin..begin + 15).contains(&fault.at_cycle);
+        faults.retain(|fault| fault.member != remote_io || !is_early(fault));
+        faults.push(at(begin, 0.5, remote_io, Action::Crash));
+        faults.push(at(begin + 5, 0.5, remote_io, Action::Restart));
+        let (simulation, seen) = run(&faults, 150);
+        assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+        assert_eq!((seen.cold_starts, seen.not_prepared), (0, 0));
+        // Each member prepares, accepts and forgets.
+        assert_eq!(seen.configured, 15, "{remote_io:?} from cycle {begin} on");
+    }
+}
+
+/// The count has another name in the new program and goes on by a pair of its file, at the switch and on the way back, while stations die; with the
+/// same pair in the file of the change after it, it goes on too.
+#[test]
+fn a_renamed_variable_goes_on() {
+    let pair = "renamed = { count = \"total\" }";
+    let of = |step: u32| {
+        let text =
+            BEFORE.replace("count :", "total :").replace("count + 1", &format!("total + {step}"));
+        cluster_with(&text.replace("count := ", "total := ").replace(":= count", ":= total"), pair)
+    };
+    let changes =
+        [changing_clusters(&cluster(BEFORE), &of(10)), changing_clusters(&of(1), &of(10))];
+    for parts in changes {
+        let mut faults = whole_change(20);
+        faults.retain(|fault| fault.at_cycle < 44);
+        faults.push(step(70, Member::RemoteIo(COUNTER), ChangeStep::SwitchBack));
+        for (cycle, station) in [(39, 0), (68, 2)] {
+            let station = Member::Station(StationId(station));
+            faults.push(at(cycle, 0.6, station, Action::Crash));
+            faults.push(at(cycle + 5, 0.6, station, Action::Restart));
+        }
+        let (simulation, seen) = run_with(parts, &faults, 120);
+        assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+        assert_eq!(misses(simulation.tallies()), 0);
+        assert_eq!((seen.changes, seen.cold_starts), (2, 0));
+        assert_eq!(steps(&seen), [1, 10, 1]);
+    }
 }
 
 #[test]

@@ -175,7 +175,7 @@ impl Layout {
                 Holds::Clock => return value as u64 / self.period as u64,
                 Holds::Scans => return value as u64,
                 Holds::Phase => phase = value as u64,
-                Holds::Value(..) | Holds::Other => {}
+                Holds::Value(..) | Holds::Other | Holds::Uncounted(_) | Holds::Unused => {}
             }
         }
         let late = least % self.together;

@@ -20,7 +20,7 @@ use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
 use crate::system::{Holds, Source, System};
 use crate::term::Term;
-pub use change::{InTheWay, Switch};
+pub use change::{AnyValue, InTheWay, Switch};
 use moments::Age;
 pub use restart::POWER_RETURNS;
 use restart::Restart;
@@ -289,6 +289,7 @@ impl System {
         inputs: &[Term],
         runs: Term,
     ) -> Result<Outputs, Unsupported> {
+        let first = self.cells.len() as u32;
         let stopped = self.cell(format!("{prefix}{}", Program::FAULT), Elementary::Bool, 0);
         let was_stopped = self.cells[stopped as usize].term;
         let scans = self.cell(format!("{prefix}scans"), Elementary::Ulint, 0);
@@ -335,6 +336,18 @@ impl System {
                 self.cells[cell as usize].holds = Holds::Count(Box::new(counted.clone()));
             }
         }
+        for (number, cell) in (first..).zip(&mut self.cells[first as usize..]) {
+            match cell.holds {
+                Holds::Value(address, _) if numbers.get(&address) != Some(&number) => {
+                    cell.holds = Holds::Unused;
+                }
+                Holds::Age(address) if !ages.contains_key(&address) => {
+                    cell.holds = Holds::Uncounted(address);
+                }
+                Holds::Clock if clock.is_none() => cell.holds = Holds::Unused,
+                _ => {}
+            }
+        }
         let outputs = program.outputs.iter().map(|point| 64 * u64::from(point.slot));
         let shown = outputs.filter(|address| !scan.memory.contains_key(address));
         let seen = scan.read.iter().copied().chain(shown);
@@ -351,6 +364,7 @@ impl System {
         // What a fault leaves: the state before the scan.
         let is_restart = self.terms.and(was_stopped, reset);
         let times: Vec<Age> = ages.values().copied().collect();
+        let moments: HashSet<u64> = ages.keys().copied().filter(|_| self.keeps_moments).collect();
         let ages = ages.into_iter().map(|(address, age)| (Some(address), age));
         for (address, age) in ages.chain(clock.into_iter().chain(time).map(|time| (None, time))) {
             let new = self.next_age(program, &scan, age, address, how.stopped);
@@ -371,6 +385,13 @@ impl System {
             let left = self.terms.choose(is_restart, initial, term);
             let new = scan.memory.get(&address).copied().unwrap_or(left);
             let mut new = self.terms.as_type(new, of);
+            if moments.contains(&address) {
+                let now = match clock {
+                    Some(_) => self.time_since_start(program, was_scans),
+                    None => scan.elapsed,
+                };
+                new = self.moment(new, &scan, (now, left));
+            }
             if let Some(&most) = sums.get(&address) {
                 new = self.stopped_at(new, most);
             }

@@ -7,6 +7,7 @@ use understudy_typed::{Comparison, Elementary, Part, Point, Program, Type};
 
 use crate::circuit::boundaries::position;
 use crate::execute::timers::Counted;
+use crate::program::AnyValue;
 use crate::term::{Term, Terms, Variable};
 
 /// An input of a system.
@@ -56,6 +57,10 @@ pub(crate) enum Holds {
     Scans,
     /// The same, from 0 again where all tasks begin together.
     Phase,
+    /// Nothing any more: the moment at an address, the time since which has no bound.
+    Uncounted(u64),
+    /// Nothing any more: what is followed in another way.
+    Unused,
 }
 
 /// Programs on terms, one step a cycle.
@@ -86,6 +91,10 @@ pub struct System {
     pub(crate) least: BTreeMap<(String, u64), i64>,
     /// What variables begin with beside their initial values, of the program that is being added.
     pub(crate) begins: Begins,
+    /// Whether the moments themselves are followed too, and not only the times since them up to where they stop.
+    pub(crate) keeps_moments: bool,
+    /// Values that a new program takes over and that may be any.
+    pub(crate) any_values: Vec<AnyValue>,
     /// Names of numbers that properties compare.
     pub(crate) wanted: BTreeSet<String>,
     /// Numbers that properties compare: after the scan, an input in the scan.
@@ -178,6 +187,8 @@ impl System {
             most: BTreeMap::new(),
             least: BTreeMap::new(),
             begins: Begins::default(),
+            keeps_moments: false,
+            any_values: Vec::new(),
             wanted: BTreeSet::new(),
             numbers: Vec::new(),
             values: HashMap::new(),

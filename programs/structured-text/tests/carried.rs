@@ -22,7 +22,7 @@ fn after(old: &Program, scans: u32, new: &Program) -> CarriedState {
     for _ in 0..scans {
         running.scan(&[]);
     }
-    new.carried(old, running.state(), Told::ALL)
+    new.carried(old, running.state(), Told::ALL, &[])
 }
 
 /// The fates, as `fate path`, of all but those that are kept.
@@ -256,7 +256,7 @@ fn a_program_that_did_not_change_keeps_everything() {
     let program = program(text);
     let mut running = Running::new(program.clone());
     (0..5).for_each(|_| drop(running.scan(&[])));
-    let carried = program.carried(&program, running.state(), Told::ALL);
+    let carried = program.carried(&program, running.state(), Told::ALL, &[]);
     assert_eq!(carried.state, program.restarted(running.state()));
     assert_eq!(fates(&carried), ["kept t", "kept a", "kept f"]);
 }
@@ -276,4 +276,51 @@ fn static_variables_of_routines_are_taken_over() {
     let mut running = Running::new(new.clone());
     running.go_on_from(&carried.state);
     assert_eq!(running.scan(&[]), [6]);
+}
+
+/// By pairs of paths: whole structures, members of them, and members that leave a structure which is gone. What a pair takes is not dropped.
+#[test]
+fn paths_of_pairs_are_taken_over() {
+    let types = |of: &str| {
+        format!(
+            "TYPE drive : STRUCT {of} temperature : INT; END_STRUCT; END_TYPE TYPE gone : STRUCT kept, lost : INT; END_STRUCT; END_TYPE"
+        )
+    };
+    let old = of(
+        &types("speed : INT;"),
+        "VAR RETAIN left : drive; old_one : gone; n : INT; f : INT; END_VAR",
+        "left.speed := 1; left.temperature := 2; old_one.kept := 3; n := 4; f := 5;",
+    );
+    let new = of(
+        &types("velocity : INT;"),
+        "VAR RETAIN right : drive; saved : INT; m : DINT; END_VAR VAR g : INT; END_VAR",
+        "",
+    );
+    let pairs = [
+        ("left", "right"),
+        ("left.speed", "right.velocity"),
+        ("old_one.kept", "saved"),
+        ("n", "m"),
+        ("f", "g"),
+        ("unknown", "saved"),
+    ];
+    let pairs = pairs.map(|(old, new)| (old.to_owned(), new.to_owned()));
+    let mut running = Running::new(old.clone());
+    running.scan(&[]);
+    let carried = new.carried(&old, running.state(), Told::ALL, &pairs);
+    let value = |name| stored(&new, name, &carried.state);
+    assert_eq!(["right.velocity", "right.temperature", "saved", "m"].map(value), [1, 2, 3, 4]);
+    let mut found = fates(&carried);
+    found.sort();
+    assert_eq!(
+        found,
+        [
+            "converted m",
+            "dropped f",
+            "dropped old_one.lost",
+            "kept right.temperature",
+            "kept right.velocity",
+            "kept saved",
+        ]
+    );
 }

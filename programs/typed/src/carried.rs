@@ -10,6 +10,9 @@
 //!   the new type does not have                             dropped
 //! ```
 //!
+//! A path that only the new program has takes over the value of the one that a declared pair names. A name in both programs is the same variable, so a
+//! pair that has done its work does nothing more.
+//!
 //! A path is that of a variable, of a member of a structure or of a function block, or of elements of an array. What has become of a path depends
 //! on the declarations, except where a value has no name in its enumeration, is none of a narrower type or is outside of a declared subrange: that one
 //! is dropped. References
@@ -19,15 +22,20 @@
 //! All stations compute the same state, since it is a function of the two programs and of the old state.
 
 mod arrays;
+mod renamed;
+mod successor;
 mod types;
 
 use std::collections::HashMap;
 
+use self::renamed::Moves;
+pub use self::renamed::{Renamed, WrongPair};
+pub use self::successor::{Origin, Successor};
 use self::types::{Conversion, conversion};
-use crate::form::Program;
+use crate::form::{Program, Variable};
 use crate::image::{Declared, Points};
 use crate::scan::SCANS;
-use crate::types::Type;
+use crate::types::{Field, Type};
 
 /// A state of the new program, and what has become of each retentive path.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -59,6 +67,8 @@ pub struct CarriedPath {
     pub path: String,
     /// What has become of it.
     pub fate: Fate,
+    /// The path in the old program, where a declared pair says that it has another name there.
+    pub renamed_from: Option<String>,
     /// Its type in the old program, where it is retentive there.
     pub before: Option<String>,
     /// Its type in the new program, where it is retentive there.
@@ -102,13 +112,20 @@ impl CarriedState {
 
 impl Program {
     /// The state with which this program starts warm from a state of the program before it. What that state does not
-    /// tell is dropped, where the new program reads it.
+    /// tell is dropped, where the new program reads it. Paths are renamed by pairs.
     ///
     /// # Panics
     /// If `state` is shorter than a state of `before`.
-    pub fn carried(&self, before: &Self, state: &[u64], told: Told<'_>) -> CarriedState {
+    pub fn carried(
+        &self,
+        before: &Self,
+        state: &[u64],
+        told: Told<'_>,
+        renamed: &[Renamed],
+    ) -> CarriedState {
         let partners = partners(before, self, &HashMap::new());
-        self.carried_from(before, state, told, (&partners, true))
+        let names = Names { partners: &partners, renamed };
+        self.carried_from(before, state, told, (&names, true))
     }
 
     /// As [`Self::carried`], with the variables that [`partners`] finds; the paths have names only where they are listed.
@@ -117,11 +134,11 @@ impl Program {
         before: &Self,
         state: &[u64],
         told: Told<'_>,
-        (partners, is_listed): (&[Option<usize>], bool),
+        (names, is_listed): (&Names<'_>, bool),
     ) -> CarriedState {
         let mut walk = Walk::new(before, self, state, told);
         walk.is_listed = is_listed;
-        let paths = walk.variables(partners);
+        let paths = walk.variables(names);
         if self.is_retentive() && before.is_retentive() {
             let time = i128::from(before.period.max(1)) * i128::from(state[SCANS]);
             let period = i128::from(self.period.max(1));
@@ -132,69 +149,11 @@ impl Program {
     }
 }
 
-/// A value of a new program that is one of the old program, by the addresses of both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Origin {
-    /// Address in the state of the old program.
-    pub before: u64,
-    /// Address in the state of the new program.
-    pub now: u64,
-    /// Whether it is stored alike in both.
-    pub is_same: bool,
-}
-
-/// A program in the place of another one, in an online change: it takes over the values of all variables, and not of the retentive ones alone. A program
-/// that a fault has stopped stays stopped.
-#[derive(Debug, Clone)]
-pub struct Successor {
-    old: Program,
-    new: Program,
-    partners: Vec<Option<usize>>,
-}
-
-impl Successor {
-    /// `new` in the place of `old`. Variables of `new` that `old` does not have take over those of other names in `old`, by their own.
-    pub fn new(old: &Program, new: &Program, others: &HashMap<String, String>) -> Self {
-        let partners = partners(old, new, others);
-        Self { old: old.all_retentive(), new: new.all_retentive(), partners }
-    }
-
-    /// The new program, all of whose variables are retentive.
-    pub fn program(&self) -> &Program {
-        &self.new
-    }
-
-    /// The state with which the new program goes on from a state of the old one.
-    ///
-    /// # Panics
-    /// If `state` is shorter than a state of the old program.
-    pub fn state(&self, state: &[u64], told: Told<'_>) -> Vec<u64> {
-        self.take(state, told, false).state
-    }
-
-    /// The same, with what has become of each path.
-    ///
-    /// # Panics
-    /// As [`Self::state`].
-    pub fn carried(&self, state: &[u64], told: Told<'_>) -> CarriedState {
-        self.take(state, told, true)
-    }
-
-    /// Where the values of the new program come from; those of all others are the initial ones, but for the slots of the header, which are kept.
-    pub fn origins(&self) -> Vec<Origin> {
-        let state = self.old.initial_state();
-        let mut walk = Walk::new(&self.old, &self.new, &state, Told::ALL);
-        walk.origins = Some(Vec::new());
-        walk.variables(&self.partners);
-        walk.origins.unwrap_or_default()
-    }
-
-    fn take(&self, state: &[u64], told: Told<'_>, is_listed: bool) -> CarriedState {
-        let mut changed =
-            self.new.carried_from(&self.old, state, told, (&self.partners, is_listed));
-        changed.state[..SCANS].copy_from_slice(&state[..SCANS]);
-        changed
-    }
+/// Which values of two programs are the same, by their names.
+struct Names<'n> {
+    /// For each variable of the new program the one of the old program with its name.
+    partners: &'n [Option<usize>],
+    renamed: &'n [Renamed],
 }
 
 impl Points {
@@ -226,6 +185,23 @@ impl Points {
 struct Spot<'p> {
     of: &'p Type,
     slot: u32,
+}
+
+impl<'p> From<&'p Variable> for Spot<'p> {
+    fn from(variable: &'p Variable) -> Self {
+        Self { of: &variable.of, slot: variable.slot }
+    }
+}
+
+impl<'p> Spot<'p> {
+    fn field(self, field: &'p Field) -> Self {
+        Self { of: &field.of, slot: self.slot + field.slot }
+    }
+
+    fn is_kept(self, program: &Program) -> bool {
+        let end = self.slot.saturating_add(self.of.slots() as u32);
+        program.retains_any(self.slot..end)
+    }
 }
 
 /// What has become of a value that is taken over by a conversion.
@@ -279,6 +255,8 @@ struct Walk<'p> {
     declared: HashMap<u32, Declared>,
     /// Where values come from, if that is asked for.
     origins: Option<Vec<Origin>>,
+    /// What pairs rename.
+    moves: Moves<'p>,
 }
 
 impl<'p> Walk<'p> {
@@ -293,6 +271,7 @@ impl<'p> Walk<'p> {
             state: new.initial_state(),
             declared: points.map(|point| (point.slot, point.declared())).collect(),
             origins: None,
+            moves: Moves::default(),
         }
     }
 
@@ -303,26 +282,49 @@ impl<'p> Walk<'p> {
         }
     }
 
-    /// Takes over each variable; `partners` are those of the new program in the old one.
-    fn variables(&mut self, partners: &[Option<usize>]) -> Vec<CarriedPath> {
+    /// Takes over each variable.
+    fn variables(&mut self, names: &Names<'_>) -> Vec<CarriedPath> {
         let (old, new) = (self.old, self.new);
-        let spot = |of: &'p crate::form::Variable| Spot { of: &of.of, slot: of.slot };
-        let known: Vec<&crate::form::Variable> = old.named().collect();
+        self.moves = Moves::new(old, new, names.renamed);
+        let known: Vec<&Variable> = old.named().collect();
         let mut is_taken = vec![false; known.len()];
         let mut paths = Vec::new();
-        for (variable, partner) in new.named().zip(partners) {
+        for (variable, partner) in new.named().zip(names.partners) {
             let partner = partner.map(|place| {
                 is_taken[place] = true;
-                spot(known[place])
+                Spot::from(known[place])
             });
-            paths.extend(self.part(&variable.name, partner, Some(spot(variable))));
+            paths.extend(self.named(&variable.name, partner, Spot::from(variable)));
         }
         if old.has_unnamed_retentive() {
             let path = "memory without a name".to_owned();
-            paths.push(CarriedPath { path, fate: Fate::Dropped, before: None, now: None });
+            paths.push(CarriedPath {
+                path,
+                fate: Fate::Dropped,
+                renamed_from: None,
+                before: None,
+                now: None,
+            });
         }
         for (variable, _) in known.into_iter().zip(is_taken).filter(|(_, taken)| !taken) {
-            paths.extend(self.part(&variable.name, Some(spot(variable)), None));
+            paths.extend(self.part(&variable.name, Some(Spot::from(variable)), None));
+        }
+        paths
+    }
+
+    /// Takes over what the new program has by a name: from what has the name in the old program, or else from what a pair names.
+    fn named(&mut self, path: &str, same: Option<Spot<'p>>, now: Spot<'p>) -> Vec<CarriedPath> {
+        let Some(from) = same.is_none().then(|| self.moves.to(path)).flatten() else {
+            return self.part(path, same, Some(now));
+        };
+        let (name, spot) = from;
+        if spot.is_kept(self.old) && !now.is_kept(self.new) {
+            return vec![self.entry(&name, Fate::Dropped, Some(spot), None)];
+        }
+        let mut paths = self.part(path, Some(spot), Some(now));
+        for part in &mut paths {
+            let rest = part.path.strip_prefix(path);
+            part.renamed_from = rest.map(|rest| format!("{name}{rest}"));
         }
         paths
     }
@@ -334,15 +336,13 @@ impl<'p> Walk<'p> {
         old: Option<Spot<'p>>,
         new: Option<Spot<'p>>,
     ) -> Vec<CarriedPath> {
-        let is_kept = |program: &Program, spot: &Spot<'_>| {
-            let end = spot.slot.saturating_add(spot.of.slots() as u32);
-            program.retains_any(spot.slot..end)
-        };
-        let old = old.filter(|spot| is_kept(self.old, spot));
-        let new = new.filter(|spot| is_kept(self.new, spot));
+        let old = old.filter(|spot| spot.is_kept(self.old));
+        let new = new.filter(|spot| spot.is_kept(self.new));
         let (Some(from), Some(to)) = (old, new) else {
             let fate = match (old, new) {
                 (None, None) => return Vec::new(),
+                (Some(of), None) if self.moves.takes(of) => return Vec::new(),
+                (Some(of), None) if self.moves.takes_of(of) => return self.rest(path, of),
                 (_, None) => Fate::Dropped,
                 (None, _) => Fate::New,
                 (Some(_), Some(_)) => unreachable!("both were there"),
@@ -357,26 +357,22 @@ impl<'p> Walk<'p> {
                     return vec![self.entry(path, Fate::Dropped, old, new)];
                 }
                 let mut parts = Vec::new();
-                let spot = |first: u32, field: &'p crate::types::Field| Spot {
-                    of: &field.of,
-                    slot: first + field.slot,
-                };
                 for field in new_type.fields.iter().filter(|field| !field.is_reference) {
                     let mut fields = old_type.fields.iter();
                     let same = fields.find(|known| {
                         !known.is_reference && known.name.eq_ignore_ascii_case(&field.name)
                     });
-                    let before = same.map(|same| spot(from.slot, same));
+                    let before = same.map(|same| from.field(same));
                     let path = format!("{path}.{}", field.name);
-                    parts.extend(self.part(&path, before, Some(spot(to.slot, field))));
+                    parts.extend(self.named(&path, before, to.field(field)));
                 }
                 for field in old_type.fields.iter().filter(|field| !field.is_reference) {
-                    let is_same = |known: &crate::types::Field| {
+                    let is_same = |known: &Field| {
                         !known.is_reference && known.name.eq_ignore_ascii_case(&field.name)
                     };
                     if !new_type.fields.iter().any(is_same) {
                         let path = format!("{path}.{}", field.name);
-                        parts.extend(self.part(&path, Some(spot(from.slot, field)), None));
+                        parts.extend(self.part(&path, Some(from.field(field)), None));
                     }
                 }
                 self.together(path, parts, (from, to))
@@ -387,6 +383,16 @@ impl<'p> Walk<'p> {
                 vec![self.entry(path, fate, old, new)]
             }
         }
+    }
+
+    /// The parts of what only the old program has, where pairs name others of its parts.
+    fn rest(&mut self, path: &str, of: Spot<'p>) -> Vec<CarriedPath> {
+        let Type::Structure(id, _) = of.of else { return Vec::new() };
+        let fields = self.old.structures[id.0 as usize].fields.iter();
+        let parts = fields.filter(|field| !field.is_reference).flat_map(|field| {
+            self.part(&format!("{path}.{}", field.name), Some(of.field(field)), None)
+        });
+        parts.collect()
     }
 
     /// Takes over a value without parts.
@@ -430,8 +436,12 @@ impl<'p> Walk<'p> {
         parts: Vec<CarriedPath>,
         (from, to): (Spot<'_>, Spot<'_>),
     ) -> Vec<CarriedPath> {
+        let is_whole = |fate| {
+            fate != Fate::New
+                && parts.iter().all(|part| part.fate == fate && part.renamed_from.is_none())
+        };
         match parts.first().map(|part| part.fate) {
-            Some(fate) if fate != Fate::New && parts.iter().all(|part| part.fate == fate) => {
+            Some(fate) if is_whole(fate) => {
                 vec![self.entry(path, fate, Some(from), Some(to))]
             }
             _ => parts,
@@ -446,12 +456,14 @@ impl<'p> Walk<'p> {
         new: Option<Spot<'_>>,
     ) -> CarriedPath {
         if !self.is_listed {
-            return CarriedPath { path: String::new(), fate, before: None, now: None };
+            let path = String::new();
+            return CarriedPath { path, fate, renamed_from: None, before: None, now: None };
         }
         let name = |program: &Program, spot: Spot<'_>| program.type_name(spot.of);
         CarriedPath {
             path: path.to_owned(),
             fate,
+            renamed_from: None,
             before: old.map(|spot| name(self.old, spot)),
             now: new.map(|spot| name(self.new, spot)),
         }

@@ -27,7 +27,9 @@ mod types;
 mod validate;
 mod visit;
 
-pub use self::carried::{CarriedPath, CarriedState, Fate, Origin, Successor, Told};
+pub use self::carried::{
+    CarriedPath, CarriedState, Fate, Origin, Renamed, Successor, Told, WrongPair,
+};
 pub use self::cost::Cost;
 pub use self::edges::EdgeMemory;
 pub use self::fault::{Cause, Fault};

@@ -1,18 +1,20 @@
 //! An online change between two cluster files: what it replaces, and why it needs a stop where it does.
 
 mod settings;
+mod unfit;
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
-use understudy_typed::{CarriedPath, Fate, Fault, Program as TypedProgram, Successor};
+use understudy_typed::{CarriedPath, Fate, Fault, Program as TypedProgram, Renamed, Successor};
 use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
 pub use self::settings::ChangedSetting;
 use self::settings::changed_settings;
+pub use self::unfit::{PairReason, Unfit};
 use crate::cluster::Cluster;
-use crate::code::{Code, Unnamed};
+use crate::code::Code;
 use crate::configuration::with_programs;
 use crate::source_text::read_kept;
 
@@ -80,39 +82,9 @@ pub struct ProgramText {
     pub period: u64,
     /// The text.
     pub text: String,
-}
-
-/// Why a program cannot be replaced by another one while it runs.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Unfit {
-    /// The points of a program differ.
-    #[error("the inputs or outputs of `{program}` differ: {point}")]
-    Points {
-        /// Name of the controller.
-        program: String,
-        /// The first point that differs.
-        point: String,
-    },
-    /// States of the program before or after cannot be converted.
-    #[error("`{program}` cannot change while it runs: one of the two programs {why}")]
-    Memory {
-        /// Name of the controller.
-        program: String,
-        /// Why.
-        why: Unnamed,
-    },
-}
-
-impl Unfit {
-    fn points(name: &str, before: &Code, after: &Code) -> Option<Self> {
-        let point = different_point(before, after)?;
-        Some(Self::Points { program: name.to_owned(), point })
-    }
-
-    fn memory(name: &str, before: &Code, after: &Code) -> Option<Self> {
-        let why = before.why_not_changed().or_else(|| after.why_not_changed())?;
-        Some(Self::Memory { program: name.to_owned(), why })
-    }
+    /// Paths of the program before and the ones that they have in this one, as the cluster file pairs them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renamed: Vec<Renamed>,
 }
 
 /// A difference between two configurations that no online change can make.
@@ -134,6 +106,16 @@ pub enum NeedsStop {
     Setting(ChangedSetting),
 }
 
+impl NeedsStop {
+    /// The code of its page.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Unfit(unfit) => unfit.code(),
+            Self::OtherCluster { .. } | Self::Setting(_) => "U0630",
+        }
+    }
+}
+
 impl ChangeTexts {
     /// The change from one cluster file to another one.
     ///
@@ -153,7 +135,9 @@ impl ChangeTexts {
         for (place, (old, new)) in (0..).zip(pairs) {
             reasons.extend(Unfit::points(&old.name, &old.code, &new.code).map(NeedsStop::from));
             if old.hash != new.hash {
-                reasons.extend(Unfit::memory(&old.name, &old.code, &new.code).map(NeedsStop::from));
+                let of_program = Unfit::memory(&old.name, &old.code, &new.code).into_iter();
+                let of_program = of_program.chain(Unfit::pairs(&old.name, &old.code, &new.code));
+                reasons.extend(of_program.map(NeedsStop::from));
                 programs.push(ChangedText {
                     program: ProgramId(place),
                     before: ProgramText::of(&old.code, old.hash),
@@ -216,7 +200,8 @@ impl ChangeTexts {
             let name = &controller.name;
             let unfit = Unfit::points(name, &before, &after)
                 .or_else(|| Unfit::points(name, &controller.code, &after))
-                .or_else(|| Unfit::memory(name, &before, &after));
+                .or_else(|| Unfit::memory(name, &before, &after))
+                .or_else(|| Unfit::pairs(name, &before, &after).into_iter().next());
             if let Some(unfit) = unfit {
                 return Err(unfit.into());
             }
@@ -281,13 +266,14 @@ impl Cluster {
 
 impl ProgramText {
     fn of(code: &Code, hash: ProgramHash) -> Self {
-        let RetainedProgram { hash, file, period, text, .. } = code.source().kept(hash);
-        Self { hash, file, period, text }
+        let RetainedProgram { hash, file, period, text, renamed, inputs: _ } =
+            code.source().kept(hash);
+        Self { hash, file, period, text, renamed }
     }
 
     fn kept(&self) -> RetainedProgram {
-        let Self { hash, file, period, text } = self.clone();
-        RetainedProgram { hash, file, period, text, inputs: Vec::new() }
+        let Self { hash, file, period, text, renamed } = self.clone();
+        RetainedProgram { hash, file, period, text, inputs: Vec::new(), renamed }
     }
 }
 
@@ -371,6 +357,12 @@ pub fn fates(before: &Code, after: &Code) -> Vec<CarriedPath> {
     after.fates(before)
 }
 
+/// The pairs of a program that have done their work: the program before has the new name already.
+pub fn done_pairs(before: &Code, after: &Code) -> Vec<Renamed> {
+    let is_done = |pair: &&Renamed| before.typed().has_path(&pair.1);
+    after.source().renamed.iter().filter(is_done).cloned().collect()
+}
+
 /// An initial value that differs between two programs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChangedInitial {
@@ -386,7 +378,8 @@ pub fn changed_initials(before: &Code, after: &Code, paths: &[CarriedPath]) -> V
     let states = programs.map(|program| program.initial_state());
     let goes_on = |path: &&CarriedPath| matches!(path.fate, Fate::Kept | Fate::Converted);
     let changed = paths.iter().filter(goes_on).filter_map(|path| {
-        let [old, new] = programs.map(|program| program.part(&path.path));
+        let was = path.renamed_from.as_ref().unwrap_or(&path.path);
+        let [old, new] = [programs[0].part(was), programs[1].part(&path.path)];
         let parts = [old?, new?];
         let values = [0, 1].map(|side: usize| {
             let (of, stored) = parts[side].stored(&states[side])?;
@@ -423,32 +416,10 @@ fn text_with(cluster: &Cluster, codes: &[(ProgramId, [Code; 2])], is_after: bool
     })
 }
 
-/// The first point that is not equal in both, in words.
-fn different_point(before: &Code, after: &Code) -> Option<String> {
-    let (old, new) = (before.interface(), after.interface());
-    let sides = [("input", &old.inputs, &new.inputs), ("output", &old.outputs, &new.outputs)];
-    for (side, old, new) in sides {
-        let (old, new): (Vec<_>, Vec<_>) = (old.iter().collect(), new.iter().collect());
-        for place in 0..old.len().max(new.len()) {
-            let is_equal = match (old.get(place), new.get(place)) {
-                (Some(one), Some(other)) => {
-                    (&one.name, one.of, one.bit, one.range)
-                        == (&other.name, other.of, other.bit, other.range)
-                }
-                _ => false,
-            };
-            if !is_equal {
-                let point = new.get(place).or(old.get(place))?;
-                return Some(format!("{side} `{}` of type {}", point.name, point.of));
-            }
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::code::Unnamed;
 
     const FILE: &str = "[cluster]\nname = \"one\"\nsecurity = \"off\"\n\n[[controller]]\nname = \"one\"\nladder = \"FILE\"\n\n[[remote_io]]\ncontroller = \"one\"\n";
 

@@ -9,7 +9,7 @@ use understudy_executable::{Executable, Interface};
 use understudy_ladder::{Executed, LowerError, Program as LadderProgram};
 use understudy_logic::Circuit;
 use understudy_typed::{
-    CarriedPath, CarriedState, EdgeMemory, Fate, Program as TypedProgram, Successor, Told,
+    CarriedPath, CarriedState, EdgeMemory, Fate, Program as TypedProgram, Renamed, Successor, Told,
 };
 use understudy_wire::ProgramHash;
 
@@ -83,6 +83,13 @@ impl Code {
         Self { typed, source, body: Body::Text }
     }
 
+    /// The same program, after one in which some paths had other names.
+    #[must_use]
+    pub fn with_renamed(self, renamed: Vec<Renamed>) -> Self {
+        let source = SourceText { renamed, ..(*self.source).clone() };
+        Self { source: Arc::new(source), ..self }
+    }
+
     /// The file that it was read from.
     pub fn source(&self) -> &SourceText {
         &self.source
@@ -147,7 +154,9 @@ impl Code {
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64]) -> CarriedState {
         let state = before.typed_state(state);
-        let mut carried = self.told(before, |told| self.typed.carried(&before.typed, &state, told));
+        let renamed = self.renamed(before);
+        let mut carried =
+            self.told(before, |told| self.typed.carried(&before.typed, &state, told, &renamed));
         if let Body::Rungs(rungs) = &self.body {
             let initial = rungs.executable.initial();
             let registers = rungs.layout.registers(&self.typed, &carried.state, initial);
@@ -280,7 +289,14 @@ impl Code {
 
     /// The way from the program before it to this one, by the names and types of its variables.
     pub(crate) fn successor(&self, before: &Self) -> Successor {
-        Successor::new(&before.typed, &self.typed, &self.same_edges(before))
+        let (others, renamed) = (self.same_edges(before), self.renamed(before));
+        Successor::new(&before.typed, &self.typed, &others, renamed)
+    }
+
+    /// Paths that have another name in this program than in the one before it: by the pairs of this one, and by those of the other one the way back.
+    fn renamed(&self, before: &Self) -> Vec<Renamed> {
+        let back = before.source.renamed.iter().map(|(old, new)| (new.clone(), old.clone()));
+        self.source.renamed.iter().cloned().chain(back).collect()
     }
 
     /// A state of the program in the order of its variables, for one as stations hold it.
@@ -305,15 +321,25 @@ impl Code {
     fn without_registers(&self, path: &str) -> CarriedPath {
         let part = self.typed.part(path);
         let of = part.map(|part| self.typed.type_name(&part.of));
-        CarriedPath { path: path.to_owned(), fate: Fate::Dropped, before: of.clone(), now: of }
+        CarriedPath {
+            path: path.to_owned(),
+            fate: Fate::Dropped,
+            renamed_from: None,
+            before: of.clone(),
+            now: of,
+        }
     }
 
-    /// The canonical text that its hash is of: equal texts mean equal behaviour, and equal states.
+    /// The canonical text that its hash is of: equal texts mean equal behaviour, equal states, and the same values of the program before it.
     pub(crate) fn text(&self) -> String {
-        match &self.body {
+        let mut text = match &self.body {
             Body::Rungs(rungs) => circuit_text(&rungs.kept, &rungs.retentive),
             Body::Text => typed_text(&self.typed),
+        };
+        for (old, new) in &self.source.renamed {
+            text += &format!("renamed {old:?} {new:?}\n");
         }
+        text
     }
 
     /// Of the canonical text; the program's own name is not in it, its role is the cluster's affair.

@@ -80,6 +80,8 @@ pub(crate) struct ControllerSection {
     pub(crate) span: Range<usize>,
     pub(crate) name: Option<Placed<String>>,
     pub(crate) ladder: Option<Placed<String>>,
+    /// By the path in the program before: where that stands, and the path in this one.
+    pub(crate) renamed: BTreeMap<String, (Range<usize>, Placed<String>)>,
     pub(crate) addresses: Addresses<Placed<SocketAddr>>,
 }
 
@@ -183,6 +185,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             span: fields.span.clone(),
             name: fields.name("name", diagnostics),
             ladder: fields.text("ladder", diagnostics),
+            renamed: fields.names("renamed", diagnostics),
             addresses: fields.addresses(diagnostics),
         })
         .collect();

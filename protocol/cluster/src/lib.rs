@@ -39,7 +39,7 @@ pub use address::{
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use change::{
     ChangeError, ChangeTexts, ChangedInitial, ChangedSetting, ChangedText, NeedsStop,
-    OnlineChanges, ProgramText, Unfit, changed_initials, fates,
+    OnlineChanges, PairReason, ProgramText, Unfit, changed_initials, done_pairs, fates,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Twin, Understudy};
 pub use code::{Code, Unnamed};

@@ -49,6 +49,7 @@ mod limits;
 mod marks;
 mod names;
 mod plants;
+mod renamed;
 mod twins;
 mod undriven;
 
@@ -271,6 +272,10 @@ fn members(
         names.listen(&section.addresses, diagnostics);
         let code =
             section.ladder.as_ref().and_then(|file| ladders.code(file, &name, period, diagnostics));
+        let code = code.map(|code| {
+            let pairs = renamed::pairs(&section.renamed, &code, diagnostics);
+            code.with_renamed(pairs)
+        });
         members.push(Member {
             section,
             name,

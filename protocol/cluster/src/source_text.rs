@@ -6,7 +6,7 @@ use std::time::Duration;
 use understudy_interchange::{Rungs, Source, SourceFile, Wanted, read_source};
 use understudy_ladder::{LowerError, Program as Ladder};
 use understudy_text::Diagnostic;
-use understudy_typed::Program as Typed;
+use understudy_typed::{Program as Typed, Renamed};
 use understudy_wire::{ProgramHash, RetainedProgram};
 
 use crate::code::Code;
@@ -20,6 +20,8 @@ pub struct SourceText {
     pub text: Arc<str>,
     /// The period of the cluster.
     pub period: Duration,
+    /// Paths of the program before it and the ones that they have here, as the cluster file pairs them.
+    pub renamed: Vec<Renamed>,
 }
 
 /// What a file says.
@@ -53,6 +55,7 @@ impl SourceText {
             period: u64::try_from(self.period.as_nanos()).unwrap_or(u64::MAX),
             text: self.text.to_string(),
             inputs: Vec::new(),
+            renamed: self.renamed.clone(),
         }
     }
 }
@@ -79,6 +82,7 @@ pub fn read_kept(kept: &RetainedProgram) -> Option<Code> {
         file: kept.file.clone(),
         text: Arc::from(kept.text.as_str()),
         period: Duration::from_nanos(kept.period),
+        renamed: kept.renamed.clone(),
     });
     let code = source.read().code(Arc::clone(&source), "")?.ok()?;
     (code.hash() == kept.hash).then_some(code)

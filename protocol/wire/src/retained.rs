@@ -130,6 +130,9 @@ pub struct RetainedProgram {
     pub text: String,
     /// Of a remote I/O: the inputs that operators write and that keep their values.
     pub inputs: Vec<String>,
+    /// Paths of the program before it and the ones that they have in this program. A record of its own, where there are any.
+    #[serde(skip)]
+    pub renamed: Vec<(String, String)>,
 }
 
 /// A state of a program with the steps since, as a station has kept them.
@@ -242,7 +245,15 @@ impl RetainedProgram {
         if self.text.len() <= MAXIMUM_KEPT_TEXT_BYTES {
             write_record(self, &mut bytes);
         }
-        (!bytes.is_empty()).then_some(bytes)
+        let length = bytes.len();
+        if length > 0 && !self.renamed.is_empty() {
+            write_record(&self.renamed, &mut bytes);
+            // Without its pairs it is another program.
+            if bytes.len() == length {
+                return None;
+            }
+        }
+        (length > 0).then_some(bytes)
     }
 
     /// The program of a file.
@@ -250,9 +261,13 @@ impl RetainedProgram {
     /// # Errors
     /// [`RetainedError`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RetainedError> {
-        match read_record(bytes, 0)? {
-            (program, length) if length == bytes.len() => Ok(program),
-            (_, length) => Err(RetainedError::Damaged(length)),
+        let (program, length): (Self, usize) = read_record(bytes, 0)?;
+        if length == bytes.len() {
+            return Ok(program);
+        }
+        match read_record(&bytes[length..], length)? {
+            (renamed, rest) if length + rest == bytes.len() => Ok(Self { renamed, ..program }),
+            (_, rest) => Err(RetainedError::Damaged(length + rest)),
         }
     }
 }
@@ -319,7 +334,9 @@ mod tests {
 
     fn program(text: String) -> RetainedProgram {
         let inputs = vec!["level".to_owned()];
-        RetainedProgram { hash: ProgramHash(3), file: "a.st".into(), period: 10, text, inputs }
+        let renamed = Vec::new();
+        let (hash, file) = (ProgramHash(3), "a.st".to_owned());
+        RetainedProgram { hash, file, period: 10, text, inputs, renamed }
     }
 
     fn step(before: Lineage, cycle: u64) -> RetainedStep {
@@ -384,6 +401,22 @@ mod tests {
         let text = "x".repeat(MAXIMUM_KEPT_TEXT_BYTES + 1);
         let program = program(text);
         assert_eq!(program.to_bytes(), None);
+    }
+
+    /// Pairs come back with the program, and a file that ends before them is not one with fewer.
+    #[test]
+    fn programs_come_back_with_their_pairs() {
+        let plain = program("text".to_owned());
+        let renamed = vec![("old.path".to_owned(), "path".to_owned())];
+        let program = RetainedProgram { renamed, ..plain.clone() };
+        let bytes = program.to_bytes().expect("it is short enough");
+        assert_eq!(RetainedProgram::from_bytes(&bytes), Ok(program));
+        let first = plain.to_bytes().expect("it is short enough").len();
+        for length in (0..bytes.len()).filter(|length| *length != first) {
+            assert!(RetainedProgram::from_bytes(&bytes[..length]).is_err(), "{length}");
+        }
+        // Its hash, which is of the pairs too, tells that this is another program.
+        assert_eq!(RetainedProgram::from_bytes(&bytes[..first]), Ok(plain));
     }
 
     /// A file of a later release is not read as one of this.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use understudy_cycle::{ChangeOrder, OnlineChange, Output};
 use understudy_wire::{
-    ChangeName, ConfigurationHash, Configurations, Header, OrderRefusal, ProgramHash, StationId,
-    StationSet, Time,
+    ChangeName, ConfigurationHash, Configurations, Header, Holding, OrderRefusal, ProgramHash,
+    StationId, StationSet, Time,
 };
 
 use super::{Execution, RemoteIo};
@@ -121,6 +121,19 @@ impl RemoteIo {
         }
     }
 
+    /// Learns of which program the history is that was adopted: a station that runs the configuration of this remote I/O, and has loaded no other one, holds
+    /// a state of the program in it.
+    pub(super) fn learn_program(&mut self, header: &Header, holdings: &[Holding]) {
+        let runs = header.configuration == self.configurations().own && header.prepared.is_none();
+        let Some(holding) = Holding::of(holdings, self.settings.program).filter(|_| runs) else {
+            return;
+        };
+        let own = self.hash();
+        if let Some(run) = self.knowledge.run_mut() {
+            run.history.learn(own, holding.lineage);
+        }
+    }
+
     /// Moves an online change on.
     pub(super) fn take_change(&mut self, now: Time, order: &ChangeOrder) {
         if let ChangeOrder::Switch(change, to) = order {
@@ -139,8 +152,7 @@ impl RemoteIo {
         if let Some(refusal) = self.refusal_of_trial(order) {
             return self.member.put(Output::Obeyed(Err(refusal)));
         }
-        let own = self.hash();
-        let may_forget = self.knowledge.run().is_none_or(|run| run.history.is_of(own));
+        let may_forget = self.has_history_of_own();
         let before = self.member.changing().change().cloned();
         self.member.take_change(now, order, may_forget);
         let changing = self.member.changing();
@@ -149,6 +161,17 @@ impl RemoteIo {
             self.adopt(&change, own);
             self.replacing = Replacing::default();
         }
+    }
+
+    /// Whether its history is one of the program of its configuration alone. So is that of a program that the change does not replace, also where this
+    /// remote I/O was restarted and does not know of which program the history is that it has adopted.
+    fn has_history_of_own(&self) -> bool {
+        let change = self.member.changing().change();
+        if change.is_some_and(|change| change.of(self.settings.program).is_none()) {
+            return true;
+        }
+        let own = self.hash();
+        self.knowledge.run().is_none_or(|run| run.history.is_of(own))
     }
 
     /// A program that is on trial is not accepted yet, and one that was taken back is not accepted at all.
@@ -230,8 +253,10 @@ impl RemoteIo {
         if !is_changed {
             return Err(OrderRefusal::NotPrepared);
         }
-        if self.knowledge.run().is_none() {
-            return Err(OrderRefusal::NotRunning);
+        let run = self.knowledge.run().ok_or(OrderRefusal::NotRunning)?;
+        // There is nothing to change, and the stations may have ended the change.
+        if run.history.is_of(to) {
+            return Ok(());
         }
         let living: StationSet =
             self.holders.stations().filter(|station| self.holders.is_living(*station)).collect();

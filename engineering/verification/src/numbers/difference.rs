@@ -1,6 +1,6 @@
 //! Which outputs of a program can differ after an online change: the old program and the new one are followed together on the same inputs.
 
-use understudy_bits::{InTheWay, Inexact, Switch, System};
+use understudy_bits::{AnyValue, InTheWay, Inexact, Switch, System};
 use understudy_logic::Circuit;
 use understudy_typed::{Elementary, Program};
 
@@ -20,7 +20,7 @@ impl Difference {
     /// A program and the one that takes its place.
     ///
     /// # Errors
-    /// What of them, or of the state that the new one takes over, is not followed.
+    /// What of them is not followed.
     pub fn between(
         before: &Program,
         after: &Program,
@@ -44,6 +44,11 @@ impl Difference {
     /// The circuit whose signals runs show.
     pub fn circuit(&self) -> &Circuit {
         self.model.circuit()
+    }
+
+    /// The values that the new program takes over and that may be any here: what depends on them and is not proved to be alike is undecided.
+    pub fn any_values(&self) -> &[AnyValue] {
+        self.model.system.any_values()
     }
 
     /// What is not followed bit by bit: an output that is proved to be alike all the same is.

@@ -101,7 +101,7 @@ END_PROGRAM"
 }
 
 /// The answer for something that the system refuses.
-pub(super) fn failed(what: &str, error: &dyn std::fmt::Display) -> Answer {
+pub(crate) fn failed(what: &str, error: &dyn std::fmt::Display) -> Answer {
     Answer::failed(Status::Failed, "U0530", format!("{what}: {error}"))
 }
 

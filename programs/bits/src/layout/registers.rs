@@ -136,7 +136,7 @@ impl Holds {
             Holds::Clock => i128::from(now).min(most),
             Holds::Scans => i128::from(scans),
             Holds::Phase => i128::from(scans % together),
-            Holds::Other => return None,
+            Holds::Other | Holds::Uncounted(_) | Holds::Unused => return None,
         })
     }
 }

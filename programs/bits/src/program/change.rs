@@ -8,7 +8,10 @@
 //! ```
 //!
 //! The switch is before the first scan, from two states at hand, or before any scan of the old program. Then every read of a cell of the new program is
-//! replaced by `changed before ? z(i) : c(x)(i)`, as for a warm start. What cannot be taken over cell by cell is told.
+//! replaced by `changed before ? z(i) : c(x)(i)`, as for a warm start. A value that cannot be taken over cell by cell may be any, which is told: what
+//! is proved for any value is true of the one that it has.
+
+mod times;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -55,14 +58,19 @@ pub enum InTheWay {
     /// A statement of one of them cannot be followed.
     #[error(transparent)]
     Unsupported(#[from] Unsupported),
-    /// A value that the new program takes over is not followed.
-    #[error("`{name}` {why}")]
-    Value {
-        /// The variable.
-        name: String,
-        /// What about it.
-        why: &'static str,
-    },
+    /// Times of the two programs depend on each other.
+    #[error("`{0}` has times that depend on each other")]
+    Times(String),
+}
+
+/// A value that the new program takes over and that is not followed: it may be any.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{name}` {why}")]
+pub struct AnyValue {
+    /// The variable.
+    pub name: String,
+    /// What about it.
+    pub why: &'static str,
 }
 
 /// A program of the two.
@@ -91,6 +99,7 @@ struct Both<'p> {
     origins: BTreeMap<u64, Origin>,
 }
 
+/// What a cell begins with, or what about it is not followed.
 type Begun = Result<Term, &'static str>;
 
 impl System {
@@ -120,23 +129,27 @@ impl System {
         for _ in 0..ATTEMPTS {
             let known = asked.clone();
             let Asked { wanted, least } = known.clone();
-            let mut system = Self { wanted, least, ..Self::new(&after.name) };
+            let mut system = Self { wanted, least, keeps_moments: true, ..Self::new(&after.name) };
             let mut both = system.both(before, after, switch, origins.clone())?;
             let changed = match switch {
                 Switch::Now { before, after } => {
                     system.begin(&both.old, before, &mut asked);
                     system.begin(&both.new, after, &mut asked);
-                    Ok(system.terms.boolean(true))
+                    system.terms.boolean(true)
                 }
                 Switch::AnyScan { .. } => system.take_over(&mut both, &mut asked),
             };
             if asked == known {
-                system.observe_differences(&both, changed?);
+                system.observe_differences(&both, changed);
                 return Ok(system);
             }
         }
-        let name = after.name.clone();
-        Err(InTheWay::Value { name, why: "has times that depend on each other" })
+        Err(InTheWay::Times(after.name.clone()))
+    }
+
+    /// The values that a new program takes over and that may be any.
+    pub fn any_values(&self) -> &[AnyValue] {
+        &self.any_values
     }
 
     /// The name of the BOOL that is TRUE where an output differs after the switch.
@@ -231,28 +244,25 @@ impl System {
     }
 
     /// Lets the new program take over the state of the old one before any scan; whether it has, or does in this scan.
-    fn take_over(&mut self, both: &mut Both<'_>, asked: &mut Asked) -> Result<Term, InTheWay> {
+    fn take_over(&mut self, both: &mut Both<'_>, asked: &mut Asked) -> Term {
         let change = self.input(Self::CHANGE.to_owned(), Elementary::Bool, None);
         let known = self.cell(Self::CHANGED.to_owned(), Elementary::Bool, 0);
         let before = self.cells[known as usize].term;
         let changed = self.terms.or(before, change);
         self.cells[known as usize].next = changed;
         let mut replaced: BTreeMap<Term, Term> = BTreeMap::new();
-        let mut failed = None;
         for cell in both.new.cells.clone() {
-            let (term, of, initial) = {
-                let cell = &self.cells[cell as usize];
-                (cell.term, cell.of, cell.initial)
-            };
+            let Cell { term, of, .. } = self.cells[cell as usize];
             let begins = match self.begun(cell, both, asked) {
                 Ok(begins) => begins,
                 Err(why) => {
                     let is_read = !matches!(self.cells[cell as usize].holds, Holds::Value(..))
                         || self.seen.contains(&cell);
-                    let name = self.cells[cell as usize].name.clone();
-                    let name = name.trim_start_matches(NEW).to_owned();
-                    failed = failed.or(is_read.then_some(InTheWay::Value { name, why }));
-                    self.terms.constant(of, initial)
+                    if is_read {
+                        let name = self.cells[cell as usize].name.trim_start_matches(NEW);
+                        self.any_values.push(AnyValue { name: name.to_owned(), why });
+                    }
+                    self.any(cell, of, both.new.program)
                 }
             };
             let read = self.terms.choose(before, term, begins);
@@ -280,9 +290,18 @@ impl System {
             *term = new;
         }
         both.new.outputs.points.extend(names.into_iter().zip(terms));
-        match failed {
-            Some(failed) => Err(failed),
-            None => Ok(changed),
+        changed
+    }
+
+    /// Any value that a cell can have.
+    fn any(&mut self, cell: u32, of: Elementary, program: &Program) -> Term {
+        let any = self.terms.unknown(of);
+        match self.cells[cell as usize].holds {
+            Holds::Phase => {
+                let together = self.terms.constant(of, together(program));
+                self.terms.apply(Operation::Modulo(of), of, &[any, together])
+            }
+            _ => any,
         }
     }
 
@@ -299,6 +318,7 @@ impl System {
         match holds {
             // Whether a fault has stopped it.
             Holds::Other => Ok(self.cells[old.cells.start as usize].term),
+            Holds::Uncounted(_) | Holds::Unused => Ok(initial(self)),
             Holds::Scans => Ok(self.held(old, |holds| matches!(holds, Holds::Scans))?),
             Holds::Phase if together(new.program) == 1 => Ok(initial(self)),
             Holds::Phase if together(new.program) == together(old.program) => {
@@ -312,28 +332,26 @@ impl System {
                     None => self.time(old, most),
                 }
             }
-            Holds::Age(address) => match origins.get(&address) {
-                None if new.program.initial_state()[(address / 64) as usize] == 0 => {
-                    self.time(old, most)
+            Holds::Age(address) => {
+                let Some(origin) = origins.get(&address) else {
+                    // A moment begins as 0.
+                    return self.time(old, most);
+                };
+                if !origin.is_same {
+                    return Err("has another type in the new program");
                 }
-                None => Err("is a moment that only the new program has"),
-                Some(origin) => {
-                    let from = origin.before;
-                    let age = self.held(
-                        old,
-                        |holds| matches!(holds, Holds::Age(address) if *address == from),
-                    );
-                    let age = age.inspect_err(|_| {
-                        self.want_count(old, from, asked);
-                    })?;
-                    if !self.reaches(age, most) {
-                        let least = most.unwrap_or(i64::MAX);
-                        asked.least.insert((OLD.to_owned(), from), least);
-                        return Err("is a moment that is longer ago than the old program asks");
-                    }
-                    Ok(self.up_to(age, most))
+                let from = origin.before;
+                let is_age = |holds: &Holds| matches!(holds, Holds::Age(at) if *at == from);
+                let Ok(age) = self.held(old, is_age) else {
+                    self.want_count(old, from, asked);
+                    return self.time_since(old, from, most);
+                };
+                if !self.reaches(age, most) {
+                    asked.least.insert((OLD.to_owned(), from), most.unwrap_or(i64::MAX));
+                    return Err("is a moment that is longer ago than the old program asks");
                 }
-            },
+                Ok(self.up_to(age, most))
+            }
             Holds::Count(counted) => {
                 let Some(origin) = origins.get(&counted.start()) else {
                     return Ok(initial(self));
@@ -366,6 +384,7 @@ impl System {
                     return Err("has another type in the new program");
                 }
                 if self.most_of(value).is_some() && !self.reaches(value, most) {
+                    asked.least.insert((OLD.to_owned(), from), most.unwrap_or(i64::MAX));
                     return Err("is a time that is longer than the old program asks");
                 }
                 Ok(self.up_to(value, most))
@@ -390,45 +409,6 @@ impl System {
         let start = starts.next();
         start.into_iter().for_each(|start| asked.want(side, start));
         start.is_some()
-    }
-
-    /// Where the cell of a term stops, if it does.
-    fn most_of(&self, term: Term) -> Option<i64> {
-        match self.terms.node(term) {
-            crate::term::Node::Variable(Variable::Cell(cell)) => self.most.get(cell).copied(),
-            _ => None,
-        }
-    }
-
-    /// Whether the cell of a term counts a time as far as another one does.
-    fn reaches(&self, term: Term, most: Option<i64>) -> bool {
-        match (self.most_of(term), most) {
-            (None, _) => true,
-            (Some(_), None) => false,
-            (Some(counted), Some(most)) => counted >= most,
-        }
-    }
-
-    fn up_to(&mut self, time: Term, most: Option<i64>) -> Term {
-        match most {
-            Some(most) => self.stopped_at(time, most),
-            None => time,
-        }
-    }
-
-    /// `TIME()` of the old program, up to where a cell of the new one stops.
-    fn time(&mut self, old: &Side<'_>, most: Option<i64>) -> Begun {
-        let stops = !self.terms.is(self.cells[old.cells.start as usize].next, false);
-        let (Some(most), false) = (most, stops) else {
-            return Err("depends on the time since the start");
-        };
-        let cell = self.cell("time".to_owned(), Elementary::Time, 0);
-        let time = self.cells[cell as usize].term;
-        let period = self.terms.constant(Elementary::Time, old.program.period as u64);
-        let add = Operation::Add(Elementary::Time);
-        let more = self.terms.apply(add, Elementary::Time, &[time, period]);
-        self.cells[cell as usize].next = self.stopped_at(more, most);
-        Ok(time)
     }
 
     /// Names where the outputs differ.

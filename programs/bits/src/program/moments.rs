@@ -122,7 +122,8 @@ impl System {
                 && self.added(next, sum, scan.program.period, &mut Vec::new()) == Some(true)
                 && let Some(most) = self.most(scan, scanned, ages, Carrier::Sum(address, sum))
             {
-                sums.insert(address, most);
+                let least = self.least.get(&(scan.prefix.to_owned(), address));
+                sums.insert(address, most.max(least.copied().unwrap_or(0)));
             }
         }
         sums
@@ -198,6 +199,11 @@ impl System {
             Some(&moment) => self.since(moment, scanned.elapsed, (period, more)),
             None => more,
         }
+    }
+
+    /// A moment after a scan that follows the time since it: that of the scan, or what it was.
+    pub(super) fn moment(&mut self, next: Term, scanned: &Scanned, both: (Term, Term)) -> Term {
+        self.since(next, scanned.elapsed, both)
     }
 
     /// A moment as the time since it: `now` where it is the scan's own, else what it was.

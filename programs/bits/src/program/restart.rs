@@ -29,7 +29,7 @@ impl Holds {
             Self::Value(address, _) | Self::Age(address) => retains(*address),
             Self::Count(counted) => retains(counted.start()),
             Self::Clock | Self::Scans | Self::Phase => program.is_retentive(),
-            Self::Other => false,
+            Self::Other | Self::Uncounted(_) | Self::Unused => false,
         }
     }
 }

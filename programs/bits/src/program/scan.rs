@@ -80,6 +80,12 @@ impl Cells for ProgramCells<'_> {
 }
 
 impl System {
+    /// `TIME()` of the scan after so many.
+    pub(super) fn time_since_start(&mut self, program: &Program, scans: Term) -> Term {
+        let period = self.terms.constant(Elementary::Time, program.period as u64);
+        self.terms.apply(Operation::Elapsed, Elementary::Time, &[scans, period])
+    }
+
     /// One scan of a program from its cells on.
     pub(super) fn scan(
         &mut self,

@@ -92,7 +92,8 @@ fn change(before: &Program, now: &Program, seed: u64, about: &str) -> (bool, boo
         is_known: &|address| old.layout.holds(address),
         is_read: &|address| new.layout.holds(address),
     };
-    let CarriedState { mut state, .. } = now.carried(before, &old.layout.state(&registers), told);
+    let CarriedState { mut state, .. } =
+        now.carried(before, &old.layout.state(&registers), told, &[]);
     let scan = Scan::new(&new.circuit);
     let Registers { packed: mut registers, lost } =
         new.layout.registers(now, &state, scan.initial());

@@ -89,6 +89,7 @@ impl<'p> Walk<'p> {
         let elements = |fate| CarriedPath {
             path: path.to_owned(),
             fate,
+            renamed_from: None,
             before: Some(self.old.type_name(&old.element)),
             now: Some(self.new.type_name(&new.element)),
         };

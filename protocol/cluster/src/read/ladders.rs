@@ -95,7 +95,12 @@ impl<'a> Ladders<'a> {
             return place.clone();
         }
         let place = (self.open)(file).map(|text| {
-            let source = SourceText { file: file.to_owned(), text: Arc::from(text), period };
+            let source = SourceText {
+                file: file.to_owned(),
+                text: Arc::from(text),
+                period,
+                renamed: Vec::new(),
+            };
             let mut read = source.read();
             if read.is_library {
                 read.diagnostics.push(no_program());

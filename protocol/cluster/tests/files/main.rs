@@ -10,6 +10,7 @@ mod notify;
 mod online_change;
 mod plant_file;
 mod press_cell;
+mod renamed;
 mod retention;
 mod schema;
 mod template;

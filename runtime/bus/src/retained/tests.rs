@@ -492,6 +492,7 @@ fn program(hash: u64) -> RetainedProgram {
         period: 10_000_000,
         text: format!("PROGRAM p{hash} END_PROGRAM"),
         inputs: Vec::new(),
+        renamed: Vec::new(),
     }
 }
 
