@@ -108,6 +108,24 @@ fn edges_of_elements_are_converted() {
     }
 }
 
+/// A task without a priority runs after those with one, in every form.
+#[test]
+fn tasks_without_a_priority_are_converted() {
+    let folder = empty_folder("scan_priority");
+    let text = "PROGRAM one VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT y : BOOL; END_VAR y := a; END_PROGRAM
+        PROGRAM two VAR_INPUT b : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR q := NOT b; END_PROGRAM
+        CONFIGURATION c RESOURCE r ON x TASK t(INTERVAL := T#10ms); TASK u(INTERVAL := T#10ms, PRIORITY := 1);
+        PROGRAM first WITH t : one; PROGRAM second WITH u : two; END_RESOURCE END_CONFIGURATION";
+    fs::write(folder.join("tasks.st"), text).expect("written");
+    fs::write(folder.join("inputs.txt"), "# second.b first.a\n1 0\n0 1\n").expect("written");
+    let converted = understudy_in(&folder, &["convert", "tasks.st", "tasks.xml"]);
+    assert_eq!(converted.status, 0, "{}", converted.shown());
+    for file in ["tasks.st", "tasks.xml"] {
+        let scanned = understudy_in(&folder, &["scan", file, "--inputs", "inputs.txt"]);
+        assert_eq!(scanned.output, "1 0 -> 0 0\n0 1 -> 1 1\n", "{file}: {}", scanned.shown());
+    }
+}
+
 /// What runs together is named, proved and drawn together, in each form.
 #[test]
 fn all_programs_of_a_file_are_meant() {

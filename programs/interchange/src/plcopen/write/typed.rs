@@ -344,12 +344,15 @@ fn instances(tree: &mut Tree, file: &File) -> Result<(), String> {
     if !file.instances.is_empty() || !file.globals.is_empty() {
         tree.open("configuration", &[("name", "Configuration0")]);
         tree.open("resource", &[("name", "Resource0")]);
+        // The document states a priority of each task, and one without comes after all others.
+        let stated = file.tasks.iter().filter_map(|task| task.priority).max();
+        let last = stated.map_or(0, |greatest| greatest.saturating_add(1));
         for task in &file.tasks {
             let interval = task.interval.and_then(|interval| u64::try_from(interval).ok());
             let interval =
                 interval.map(|interval| standard_time(std::time::Duration::from_nanos(interval)));
             let single = task.single.as_ref().map(print::expression);
-            let priority = task.priority.unwrap_or(0).to_string();
+            let priority = task.priority.unwrap_or(last).to_string();
             let mut attributes = vec![("name", task.name.as_str()), ("priority", &priority)];
             attributes.extend(interval.as_deref().map(|interval| ("interval", interval)));
             attributes.extend(single.as_deref().map(|single| ("single", single)));
