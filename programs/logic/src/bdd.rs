@@ -24,6 +24,16 @@ const SHALLOW: usize = 500;
 
 type Nodes<'id> = <BDDFunction as Function>::Manager<'id>;
 
+/// What an operation of the library makes of diagrams.
+macro_rules! operated {
+    ($diagrams:ident, $operation:ident, $($operand:ident),+) => {
+        $diagrams.made(|nodes| {
+            let made = BDDFunction::$operation(nodes, $($operand.0.as_edge(nodes)),+)?;
+            Ok(BDDFunction::from_edge(nodes, made))
+        })
+    };
+}
+
 /// Why a diagram could not be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum BddError {
@@ -159,39 +169,27 @@ impl Diagrams {
     /// It is not declared, or there is no node left.
     pub fn variable(&self, variable: Variable) -> Result<Diagram, BddError> {
         let number = *self.numbers.get(&variable).ok_or(BddError::UnknownVariable(variable))?;
-        self.made(|nodes| Ok(BDDFunction::from_edge(nodes, BDDFunction::var_edge(nodes, number)?)))
+        self.made(|nodes| BDDFunction::var(nodes, number))
     }
 
     /// Negation.
     pub fn not(&self, operand: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|nodes| {
-            let made = BDDFunction::not_edge(nodes, operand.0.as_edge(nodes))?;
-            Ok(BDDFunction::from_edge(nodes, made))
-        })
+        operated!(self, not_edge, operand)
     }
 
     /// Logical product.
     pub fn and(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|nodes| {
-            let made = BDDFunction::and_edge(nodes, left.0.as_edge(nodes), right.0.as_edge(nodes))?;
-            Ok(BDDFunction::from_edge(nodes, made))
-        })
+        operated!(self, and_edge, left, right)
     }
 
     /// Logical sum.
     pub fn or(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|nodes| {
-            let made = BDDFunction::or_edge(nodes, left.0.as_edge(nodes), right.0.as_edge(nodes))?;
-            Ok(BDDFunction::from_edge(nodes, made))
-        })
+        operated!(self, or_edge, left, right)
     }
 
     /// Exclusive or.
     pub fn xor(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|nodes| {
-            let made = BDDFunction::xor_edge(nodes, left.0.as_edge(nodes), right.0.as_edge(nodes))?;
-            Ok(BDDFunction::from_edge(nodes, made))
-        })
+        operated!(self, xor_edge, left, right)
     }
 
     /// `one` where `condition` holds, `zero` elsewhere.
@@ -204,11 +202,7 @@ impl Diagrams {
         one: &Diagram,
         zero: &Diagram,
     ) -> Result<Diagram, BddError> {
-        self.made(|nodes| {
-            let [condition, one, zero] = [condition, one, zero].map(|one| one.0.as_edge(nodes));
-            let made = BDDFunction::ite_edge(nodes, condition, one, zero)?;
-            Ok(BDDFunction::from_edge(nodes, made))
-        })
+        operated!(self, ite_edge, condition, one, zero)
     }
 
     /// Whether the function is 1 for some value of each variable of the product `variables`.
@@ -216,14 +210,7 @@ impl Diagrams {
     /// # Errors
     /// Too many nodes.
     pub fn exists(&self, diagram: &Diagram, variables: &Diagram) -> Result<Diagram, BddError> {
-        self.made(|nodes| {
-            let made = BDDFunction::exists_edge(
-                nodes,
-                diagram.0.as_edge(nodes),
-                variables.0.as_edge(nodes),
-            )?;
-            Ok(BDDFunction::from_edge(nodes, made))
-        })
+        operated!(self, exists_edge, diagram, variables)
     }
 
     /// The product of declared variables, for [`Self::exists`].
@@ -370,7 +357,7 @@ impl Diagrams {
     }
 
     /// Alone with the diagrams, so that the library's own collection of dead nodes waits: in the middle of an operation it would clear the cache of what
-    /// was worked out, again and again near the bound, and the operation would begin again and again. On the deep stack somebody else may be at work.
+    /// was worked out, again and again near the bound, and the operation would begin again and again. On the deep stack another operation may be at work.
     fn operate(
         &self,
         operation: &(impl for<'id> Fn(&Nodes<'id>) -> AllocResult<BDDFunction> + Sync),
