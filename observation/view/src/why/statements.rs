@@ -158,28 +158,23 @@ impl<'m> Explainer<'m> {
         if let Some(routine) = fault.routine {
             self.locate(&mut reason, routine, fault.line);
         }
-        reason.because = match self.not_finite(&fault, &trace) {
-            Some((output, address, stored, write)) => {
-                vec![self.written((&output, address, Some(stored)), &trace, write, at, 0)]
-            }
+        reason.because = match self.not_finite(&fault, &trace, at) {
+            Some(output) => vec![output],
             None => self.reads(&last_reads(&trace.failed), &trace, at, 0, None),
         };
         Some(reason)
     }
 
-    /// The output that is not a finite number, and the statement that assigned it.
-    fn not_finite(
-        &self,
-        fault: &Fault,
-        trace: &Trace,
-    ) -> Option<(String, u64, (Elementary, u64), usize)> {
+    /// The output that is not a finite number, as a statement of the scan at `place` assigned it.
+    fn not_finite(&mut self, fault: &Fault, trace: &Rc<Trace>, place: usize) -> Option<Reason> {
         let Cause::OutputNotFinite { output, value } = fault.cause else {
             return None;
         };
         let point = self.program.outputs.iter().nth(output as usize)?;
         let address = 64 * u64::from(point.slot);
         let write = trace.last_write(address)?;
-        Some((point.name.clone(), address, (point.of, value), write))
+        let output = (point.name.as_str(), address, Some((point.of, value)));
+        Some(self.written(output, trace, write, place, 0))
     }
 
     fn trace(&mut self, place: usize) -> Option<Rc<Trace>> {
@@ -400,11 +395,10 @@ impl<'m> Explainer<'m> {
             format!("assigned in cycle {when}, and kept since")
         };
         let mut reason = self.leaf(&part.name, value, place, kept);
-        let stored_after = part.stored(&trace.memory);
         let done = &trace.done[write];
         self.locate(&mut reason, done.routine, done.line);
         if is_followed {
-            let written = (part.name.as_str(), part.address, stored_after);
+            let written = (part.name.as_str(), part.address, value);
             reason.because = self.written(written, &trace, write, writer, depth + 1).because;
         }
         reason

@@ -80,7 +80,7 @@ impl Cells for ProgramCells<'_> {
 }
 
 impl System {
-    /// `TIME()` of the scan after so many.
+    /// `TIME()` of the scan behind this number of scans.
     pub(super) fn time_since_start(&mut self, program: &Program, scans: Term) -> Term {
         let period = self.terms.constant(Elementary::Time, program.period as u64);
         self.terms.apply(Operation::Elapsed, Elementary::Time, &[scans, period])
