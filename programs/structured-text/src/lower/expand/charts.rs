@@ -71,6 +71,22 @@ pub(super) fn statements(
         let message = format!("the chart of `{}` has no INITIAL_STEP", unit.name);
         writer.error("U1015", message, unit.name.span());
     }
+    let taken = chart.steps.iter().filter_map(|step| {
+        let mut variables = unit.declarations.iter().map(|declaration| &declaration.name);
+        Some((&step.name, variables.find(|variable| **variable == step.name)?))
+    });
+    let taken: Vec<Diagnostic> = taken
+        .map(|(step, variable)| {
+            let message = format!("`{step}` is a step and a variable");
+            Diagnostic::error("U1042", message, step.span())
+                .with_related(variable.span(), "the variable")
+                .with_help("rename one of them")
+        })
+        .collect();
+    if !taken.is_empty() {
+        writer.diagnostics.extend(taken);
+        return (Vec::new(), Vec::new());
+    }
     writer.steps(&unit.name.span());
     writer.transitions();
     writer.actions();
