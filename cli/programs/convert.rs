@@ -12,7 +12,7 @@ use understudy_interchange::{
     typed_text, unknown_form, write,
 };
 use understudy_text::duration::parse_positive;
-use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
+use understudy_text::{Lines, MAXIMUM_SHOWN, Report, has_errors, shortened};
 
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramText};
@@ -84,8 +84,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         Some(_) => ProgramText::of(&arguments.from_file)?,
     };
     let (name, source) = (joined.name.clone(), joined.text.clone());
-    let form = arguments.from.map(Form::format);
-    let reading = match form.or_else(|| Format::of(&name, &source)) {
+    let form_named = arguments.from.map(Form::format);
+    let reading = match form_named.or_else(|| Format::of(&name, &source)) {
         Some(format) => read(format, &name, &source, arguments.unit.as_deref()),
         None => Reading { diagnostics: vec![unknown_form(&source)], ..Reading::default() },
     };
@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
                 }
                 Err(error) => {
                     if is_typed {
-                        report.diagnostics = as_it_is.diagnostics;
+                        report.diagnostics.clone_from(&as_it_is.diagnostics);
                     }
                     Some(Err(failed(error)))
                 }
@@ -134,7 +134,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         if arguments.fidelity { fidelity_text(&fidelity, &report) } else { String::new() };
     let Some(written) = written else {
         let fidelity = fidelity_value(&fidelity, &report, None);
-        let mut answer = Answer::bad_files(joined.reports(report.diagnostics));
+        // The errors of the whole file, as `check` has them; it has those of another form where one is named.
+        let found = match form_named.is_none() && has_errors(&as_it_is.diagnostics) {
+            true => as_it_is.diagnostics,
+            false => report.diagnostics,
+        };
+        let mut answer = Answer::bad_files(joined.reports(found));
         answer.text = kept;
         answer.result = json!({ "file": null, "text": null, "fidelity": fidelity });
         return Err(answer);

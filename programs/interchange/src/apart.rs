@@ -95,6 +95,7 @@ pub fn read_apart(name: &str, text: &str, copies: Copies) -> (Vec<Apart>, Vec<Di
         }
         apart.push(alone);
     }
+    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     (apart, diagnostics)
 }
 
