@@ -208,11 +208,13 @@ impl Subject {
     /// # Errors
     /// Every name that is not a signal of the program (U0435).
     pub fn resolve(&self, property: &Property) -> Result<Resolved, Vec<Diagnostic>> {
-        resolve(&property.formula, &self.circuit)
-            .map_err(|unknown| unknown.into_iter().map(|named| self.unknown(named)).collect())
+        resolve(&property.formula, &self.circuit).map_err(|unknown| {
+            unknown.into_iter().map(|named| self.unknown(named, &|_| false)).collect()
+        })
     }
 
-    pub(crate) fn unknown(&self, named: &Named) -> Diagnostic {
+    /// What is wrong with a name that is no BOOL. Of the bits of a number, the number is known.
+    pub(crate) fn unknown(&self, named: &Named, is_number: &dyn Fn(&str) -> bool) -> Diagnostic {
         if named.compared.is_some() {
             let program = self.circuit.name();
             let message = format!("`{named}` is no comparison of a number of `{program}`");
@@ -221,8 +223,13 @@ impl Subject {
             return Diagnostic::error("U0435", message, named.span.clone()).with_help(help);
         }
         let outputs = self.circuit.outputs().iter().map(|output| &output.name);
-        let names = outputs.chain(self.circuit.inputs()).map(String::as_str);
-        let help = suggestion(&named.name, names);
+        let names = outputs.chain(self.circuit.inputs()).map(|name| match name.rsplit_once('.') {
+            Some((number, _)) if is_number(number) => number,
+            _ => name,
+        });
+        let mut known: Vec<&str> = names.collect();
+        known.dedup();
+        let help = suggestion(&named.name, known);
         let message = format!("`{}` is not a signal of `{}`", named.name, self.circuit.name());
         Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
     }
