@@ -19,7 +19,7 @@ use understudy_journal::{
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
 use understudy_text::visible_json;
-use understudy_typed::Elementary;
+use understudy_typed::Declared;
 use understudy_view::{Run, find_running_of};
 use understudy_wire::{Cycle, Force, Member, Role, SignalPlace, StateChoice, Write, WriteAnswer};
 
@@ -239,11 +239,11 @@ fn named(arguments: &Arguments) -> Result<Member, Answer> {
     crate::member::find(&cluster, &arguments.name)
 }
 
-/// The forced signal: its place, its type, and the text of its value.
+/// The forced signal: its place, its declaration, and the text of its value.
 fn place<'a>(
     arguments: &'a Arguments,
     cluster: &Cluster,
-) -> Result<(SignalPlace, Elementary, &'a str), Answer> {
+) -> Result<(SignalPlace, Declared, &'a str), Answer> {
     let text = arguments.signal.as_deref().unwrap_or_default();
     let (name, value) = text.split_once('=').unwrap_or((text, ""));
     let bad = |message: String| Answer::failed(Status::BadInput, "U0556", message);
@@ -254,9 +254,9 @@ fn place<'a>(
     };
     let Interface { inputs, outputs } = &cluster.controllers()[program.index()].interface;
     let name = name.trim();
-    let input = inputs.find(name).map(|point| (SignalPlace::Input(point.bit as u16), point.of));
-    let output = outputs.find(name).map(|point| (SignalPlace::Output(point.bit as u16), point.of));
-    let (place, of) = input.or(output).ok_or_else(|| {
+    let input = inputs.find(name).map(|point| (SignalPlace::Input(point.bit as u16), point));
+    let output = outputs.find(name).map(|point| (SignalPlace::Output(point.bit as u16), point));
+    let (place, point) = input.or(output).ok_or_else(|| {
         let names: Vec<&str> = inputs.names().chain(outputs.names()).collect();
         let names = names.join(", ");
         bad(format!(
@@ -264,13 +264,13 @@ fn place<'a>(
             arguments.name
         ))
     })?;
-    Ok((place, of, value.trim()))
+    Ok((place, point.declared(), value.trim()))
 }
 
 /// A force of a signal as a whole.
 fn force(arguments: &Arguments, cluster: &Cluster, owner: &str) -> Result<Force, Answer> {
-    let (signal, of, text) = place(arguments, cluster)?;
-    let value = force_value(text, of)
+    let (signal, declared, text) = place(arguments, cluster)?;
+    let value = force_value(text, &declared)
         .map_err(|message| Answer::failed(Status::BadInput, "U0556", message))?;
     let force = Force {
         signal,

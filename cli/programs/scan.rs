@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use clap::Args;
 use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 use understudy_executable::{Executable, Interface, Scratch, declared, digest};
 use understudy_interchange::{Source, USUAL_PERIOD, Wanted, no_program, read_source};
 use understudy_text::{Diagnostic, Report, duration, has_errors};
-use understudy_typed::{Elementary, Fault, Point, Points, Program};
+use understudy_typed::{Declared, Elementary, Fault, Point, Points, Program};
 
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramText};
@@ -25,7 +25,7 @@ Example:
   understudy scan examples/heated-tank/level.st --digest 100000
 
 A line of the file holds the values of all inputs, with blanks between: BOOL as 0 or 1, integers and bit strings in decimal, REAL and LREAL
-as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds. A line `# NAME NAME ...` with the
+as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds, values of enumerations by their names. A line `# NAME NAME ...` with the
 names of all inputs gives the order of the values below it; without one it is that of the list `inputs` of --json: inputs at addresses and
 global ones first, then as they are declared. Empty lines and other lines that begin with # are skipped. Each scan is printed as `inputs -> outputs` in the same notation.
 With --digest, the inputs are pseudo-random and the same in every run. The digest of all outputs is equal on every processor and in every
@@ -83,7 +83,7 @@ struct Digested {
 struct Signal {
     name: String,
     #[serde(rename = "type")]
-    of: &'static str,
+    of: String,
 }
 
 #[derive(Serialize)]
@@ -218,14 +218,14 @@ fn values(
     let mut wrong = Vec::new();
     for (word, &column) in words.into_iter().zip(columns) {
         let point = points[column];
-        let Some(stored) = point.of.read(word) else {
+        let declared = point.declared();
+        let Some(stored) = declared.read(word) else {
             let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
-            let message = format!("invalid {} `{word}` for `{}`", point.of, point.name);
+            let message = format!("invalid {declared} `{word}` for `{}`", point.name);
             let diagnostic = Diagnostic::error("U0439", message, at..at + word.len());
-            wrong.push(diagnostic.with_help(expected(point.of)));
+            wrong.push(diagnostic.with_help(expected(&declared)));
             continue;
         };
-        let declared = point.declared();
         if !declared.contains(stored) {
             let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
             let message = format!("`{word}` for `{}` is outside {declared}", point.name);
@@ -238,7 +238,12 @@ fn values(
     if wrong.is_empty() { Ok(read) } else { Err(wrong) }
 }
 
-fn expected(of: Elementary) -> String {
+fn expected(declared: &Declared) -> String {
+    let of = declared.of;
+    if let Some(known) = &declared.values {
+        let names = known.values.iter().take(MAXIMUM_REPORTED).map(|(name, _)| name.as_str());
+        return format!("write one of {}", names.collect::<Vec<_>>().join(", "));
+    }
     match of {
         Elementary::Bool => "write 0 or 1".to_owned(),
         Elementary::Real => "write 8 hexadecimal digits, or a number with a point".to_owned(),
@@ -294,7 +299,7 @@ impl Subject {
         }
         let signals = |points: &Points| {
             let signals = declared(points)
-                .map(|point| Signal { name: point.name.clone(), of: point.of.name() });
+                .map(|point| Signal { name: point.name.clone(), of: point.declared().to_string() });
             signals.collect()
         };
         let result = Result {
@@ -318,17 +323,13 @@ impl Subject {
 /// The values of an image in the notation of the file.
 pub(crate) fn written(points: &Points, image: &[u64]) -> String {
     let values: Vec<String> =
-        declared(points).map(|point| point.of.write(point.get(image))).collect();
+        declared(points).map(|point| point.declared().write(point.get(image))).collect();
     values.join(" ")
 }
 
 fn named(points: &Points, image: &[u64]) -> Map<String, Value> {
     let values = declared(points).map(|point| {
-        let value = match point.of {
-            Elementary::Bool => json!(point.get(image) == 1),
-            _ => understudy_view::number_of(point, image),
-        };
-        (point.name.clone(), value)
+        (point.name.clone(), understudy_view::shown(&point.declared(), point.get(image)))
     });
     values.collect()
 }

@@ -180,8 +180,7 @@ pub(crate) fn written(
     };
     let mut inputs = members.operator_inputs(program);
     let named = inputs.find(|named| named.input.place.bit == input)?;
-    let (of, stored) = (named.input.place.of, value.stored());
-    Some((named.name.clone(), value_text(of, stored)))
+    Some((named.name.clone(), value_text(&named.declared, value.stored())))
 }
 
 /// The input that a step sets, by its first bit.
@@ -191,7 +190,7 @@ pub(crate) fn set(member: Member, input: u16, members: &Members) -> Option<&Name
 
 /// A value as scenario files write it.
 pub(crate) fn set_value(signal: &NamedSignal, value: PointValue) -> String {
-    value_text(signal.of, value.stored())
+    value_text(&signal.declared, value.stored())
 }
 
 /// What must come of a run. Counts are over all remote I/Os, from the origin to the last cycle.

@@ -203,13 +203,16 @@ impl ForceSummary {
     fn new(done: &DoneForce, members: &Members) -> Self {
         let DoneForce { program, force, from, to, refused } = done;
         let known = members.signal(*program, force.signal);
-        let known = known.filter(|known| known.of.bits() == u32::from(force.value.width()));
+        let known =
+            known.filter(|known| known.declared.of.bits() == u32::from(force.value.width()));
         let stored = force.value.stored();
         Self {
             name: members.name(Member::RemoteIo(*program)).to_owned(),
             signal: known.map_or_else(|| format!("{:?}", force.signal), |known| known.name.clone()),
-            value: known
-                .map_or_else(|| format!("16#{stored:X}"), |known| value_text(known.of, stored)),
+            value: known.map_or_else(
+                || format!("16#{stored:X}"),
+                |known| value_text(&known.declared, stored),
+            ),
             from: *from,
             to: *to,
             owner: force.owner.clone(),

@@ -123,7 +123,15 @@ fn a_program_of_every_type_is_drafted_and_masked() {
     assert_eq!(draft(&folder, "each.st"), (true, true));
     simulate(&folder, "each.st");
     let text = fs::read_to_string(folder.join("cell/cluster.toml")).expect("written");
-    for line in ["q0 = false", "q6 = 0", "q13 = 0.0", "q15 = \"0ms\"", "q19 = 0", "q21 = 5"] {
+    for line in [
+        "q0 = false",
+        "q6 = 0",
+        "q13 = 0.0",
+        "q15 = \"0ms\"",
+        "q16 = \"1970-01-01\"",
+        "q19 = \"red\"",
+        "q21 = 5",
+    ] {
         assert!(text.lines().any(|found| found == line), "{line}: {text}");
     }
     let plant = fs::read_to_string(folder.join("cell/each-plant.st")).expect("written");

@@ -138,8 +138,8 @@ impl Binding {
                     continue;
                 };
                 let (sender, receiver) = match direction {
-                    Direction::Sensor => (terminal.declared, point.declared()),
-                    Direction::Actuator => (point.declared(), terminal.declared),
+                    Direction::Sensor => (&terminal.declared, &point.declared()),
+                    Direction::Actuator => (&point.declared(), &terminal.declared),
                 };
                 if !receiver.takes(sender) {
                     problems.push(BindingProblem::OtherType {

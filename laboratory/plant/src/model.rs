@@ -87,7 +87,7 @@ pub struct Terminal {
 impl Terminal {
     /// One that is on or off.
     fn bit(name: &str) -> Self {
-        Self { name: name.to_owned(), declared: Declared { of: Elementary::Bool, range: None } }
+        Self { name: name.to_owned(), declared: Elementary::Bool.into() }
     }
 
     pub(crate) fn bits(&self) -> usize {

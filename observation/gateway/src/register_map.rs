@@ -235,7 +235,7 @@ impl RegisterMap {
                         address: address as u16,
                         width: width as u16,
                         name,
-                        meaning: format!("{}{unit}: {meaning}", point.of).into(),
+                        meaning: format!("{}{unit}: {meaning}", type_of(point)).into(),
                         writable: target.is_some(),
                     });
                     if let Some(target) = target {
@@ -333,6 +333,16 @@ fn targets(
     })
 }
 
+/// Values of an enumeration that a meaning names.
+const MOST_NAMES: usize = 16;
+
+/// The type of a register's point, with the values of an enumeration: `INT, 0 Off, 1 Auto`.
+fn type_of(point: &Point) -> String {
+    let known = point.values.iter().flat_map(|known| &known.values);
+    let values = known.take(MOST_NAMES).map(|(name, value)| format!(", {value} {name}"));
+    format!("{}{}", point.of, values.collect::<String>())
+}
+
 /// How an operator writes an input.
 fn meaning_of(declaration: &OperatorDeclaration) -> String {
     let input = &declaration.input;
@@ -341,7 +351,7 @@ fn meaning_of(declaration: &OperatorDeclaration) -> String {
         OperatorInputKind::Level => format!("level, written by the role {role}"),
         OperatorInputKind::Pulse(_) => format!("pulse: TRUE presses it, by the role {role}"),
         OperatorInputKind::Setpoint { low, high } => {
-            let text = |stored| value_text(input.place.of, stored);
+            let text = |stored| value_text(&declaration.declared, stored);
             let unit = declaration.unit.as_deref().unwrap_or_default();
             let range = format!("{} to {} {unit}", text(low), text(high));
             format!("setpoint, {}, written by the role {role}", range.trim_end())

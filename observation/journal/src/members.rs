@@ -2,7 +2,7 @@
 
 use understudy_cluster::{Cluster, InputSource};
 use understudy_remote_io::OperatorInput;
-use understudy_typed::{Elementary, Point};
+use understudy_typed::{Declared, Point};
 use understudy_wire::{Member, ProgramId, SignalPlace, StationId, StationSet};
 
 /// Every member of a cluster with its name: stations by rank, then remote I/Os, then plants.
@@ -24,8 +24,8 @@ pub struct NamedSignal {
     pub place: SignalPlace,
     /// Name in the program.
     pub name: String,
-    /// Type.
-    pub of: Elementary,
+    /// How the program declares it.
+    pub declared: Declared,
     /// Unit of a setpoint.
     pub unit: Option<String>,
     /// The output of another program that it is, such as `press.done`.
@@ -41,6 +41,8 @@ pub struct NamedInput {
     pub name: String,
     /// Place and behaviour.
     pub input: OperatorInput,
+    /// How the program declares it.
+    pub declared: Declared,
 }
 
 impl Members {
@@ -51,10 +53,12 @@ impl Members {
         let inputs = programs.flat_map(|(program, remote_io)| {
             let sources = remote_io.inputs.iter();
             sources.filter_map(move |source| {
+                let operator = source.operator()?;
                 Some(NamedInput {
                     program,
                     name: source.name.clone(),
-                    input: source.operator()?.input,
+                    input: operator.input,
+                    declared: operator.declared.clone(),
                 })
             })
         });
@@ -173,7 +177,7 @@ fn signals(cluster: &Cluster, program: usize) -> Vec<NamedSignal> {
         NamedSignal {
             place,
             name: point.name.clone(),
-            of: point.of,
+            declared: point.declared(),
             unit: source.and_then(|source| source.operator()?.unit.clone()),
             from: signal.map(|signal| {
                 let from = &cluster.controllers()[signal.input.from.index()].name;

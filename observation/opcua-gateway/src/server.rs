@@ -16,8 +16,8 @@ use opcua::server::{
 };
 use opcua::types::{
     BuildInfo, ByteString, DataTypeId, DataValue, DateTime, EUInformation, ExtensionObject,
-    MessageSecurityMode, NodeId, ObjectId, ObjectTypeId, QualifiedName, Range, VariableTypeId,
-    Variant,
+    LocalizedText, MessageSecurityMode, NodeId, ObjectId, ObjectTypeId, QualifiedName, Range,
+    VariableTypeId, Variant,
 };
 use tokio::net::TcpListener;
 use understudy_bus::{Connections, Listener, relay};
@@ -245,6 +245,7 @@ fn add_nodes(
         let rank = if kind == Kind::Strings { 1 } else { -1 };
         let limits = variable.writable().and_then(|input| input.limits);
         let type_of = match limits {
+            _ if !variable.names().is_empty() => VariableTypeId::MultiStateDiscreteType,
             Some(_) => VariableTypeId::AnalogItemType,
             None => VariableTypeId::BaseDataVariableType,
         };
@@ -262,6 +263,18 @@ fn add_nodes(
         builder.insert(space);
         if let Some(input) = variable.writable() {
             add_properties(space, index, &variable.path(), input);
+        }
+        if !variable.names().is_empty() {
+            let names = variable.names().iter().map(|name| name.as_str().into());
+            let names: Vec<LocalizedText> = names.collect();
+            let property = NodeId::new(index, format!("{}/EnumStrings", variable.path()));
+            VariableBuilder::new(&property, QualifiedName::new(0, "EnumStrings"), "EnumStrings")
+                .data_type(DataTypeId::LocalizedText)
+                .value_rank(1)
+                .value(Variant::from(names))
+                .has_type_definition(VariableTypeId::PropertyType)
+                .property_of(node)
+                .insert(space);
         }
     }
 }

@@ -142,6 +142,8 @@ pub struct Variable {
     kind: Kind,
     meaning: &'static str,
     writable: Option<WritableInput>,
+    /// The names of the values of an enumeration, by number from 0; empty for a number without a name.
+    names: Vec<String>,
     read: Read,
 }
 
@@ -174,6 +176,10 @@ impl Variable {
     /// Whether it is an operator input.
     pub fn is_writable(&self) -> bool {
         self.writable.is_some()
+    }
+
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
     }
 
     pub(crate) fn writable(&self) -> Option<&WritableInput> {
@@ -241,6 +247,7 @@ impl Tree {
             kind,
             meaning,
             writable: None,
+            names: Vec::new(),
             read: Box::new(read),
         });
     }

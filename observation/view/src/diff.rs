@@ -8,7 +8,7 @@ use understudy_wire::{Image, ProgramId};
 
 use crate::model::Model;
 use crate::timeline::Timeline;
-use crate::value::stored_text;
+use crate::value::point_text;
 
 /// What differs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -161,11 +161,8 @@ fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Im
         points.filter(|point| point.get(left.words()) != point.get(right.words())).collect();
     let text = |image: &Image| {
         let values = differing.iter();
-        let texts: Vec<String> = values
-            .map(|point| {
-                format!("{} = {}", point.name, stored_text(point.of, point.get(image.words())))
-            })
-            .collect();
+        let texts: Vec<String> =
+            values.map(|point| format!("{} = {}", point.name, point_text(point, image))).collect();
         texts.join(", ")
     };
     (found.left, found.right) = (text(left), text(right));

@@ -94,8 +94,7 @@ impl<'t> Scan<'t> {
 
     /// A variable at the end of the scan.
     fn after(&self, name: &str) -> Option<String> {
-        let (of, stored) = self.part(name)?.stored(&self.trace.memory)?;
-        Some(of.text(stored))
+        self.part(name)?.text(&self.trace.memory)
     }
 
     fn network(&self, network: &mut Network, lines: &Lines) {
@@ -152,7 +151,7 @@ impl<'t> Scan<'t> {
         let part = self.part(name)?;
         let mut reads = done.iter().flat_map(|done| &done.reads);
         match reads.find(|read| read.address == part.address) {
-            Some(read) => Some(read.of.text(read.value)),
+            Some(read) => Some(part.declared()?.text(read.value)),
             None => self.after(name),
         }
     }

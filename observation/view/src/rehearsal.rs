@@ -14,7 +14,7 @@ use understudy_typed::{Point, Points};
 use understudy_wire::{Image, Lineage};
 
 use crate::history::{Sampled, Step};
-use crate::value::{named_text, stored_text};
+use crate::value::{named_text, point_text};
 
 /// What the new program of one controller would have done.
 #[derive(Debug)]
@@ -163,9 +163,9 @@ impl Rehearsal {
         }
         if self.found.first.is_none() {
             let text = |image: &Image| {
-                let texts = differing.iter().map(|point| {
-                    format!("{} = {}", point.name, stored_text(point.of, value(image, point)))
-                });
+                let texts = differing
+                    .iter()
+                    .map(|point| format!("{} = {}", point.name, point_text(point, image)));
                 texts.collect::<Vec<String>>().join(", ")
             };
             self.found.first = Some(FirstDifference {

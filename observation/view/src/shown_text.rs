@@ -10,7 +10,7 @@ use understudy_wire::ProgramId;
 use crate::error::ViewError;
 use crate::model::Model;
 use crate::source_text::{Line, SourceText, Use};
-use crate::value::elementary;
+use crate::value;
 
 /// A line of a program's text, in one scan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -36,7 +36,7 @@ pub struct NamedValue {
     pub value: Value,
     /// Its type, such as `TIME`.
     #[serde(rename = "type")]
-    pub of: &'static str,
+    pub of: String,
 }
 
 /// Where a variable is assigned and read.
@@ -140,18 +140,19 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         let unit = line.unit.filter(|_| line.is_program)?;
         let behind_program = format!("{unit}.{name}");
         let part = typed.part(&behind_program).or_else(|| typed.part(name));
-        let stored = part.and_then(|part| part.stored(memory));
+        let stored = part.and_then(|part| Some((part.declared()?, part.stored(memory)?.1)));
         let key = (unit.to_lowercase(), name.to_lowercase());
-        stored.or_else(|| temporary.get(&key).copied())
+        stored.or_else(|| temporary.get(&key).map(|(of, stored)| ((*of).into(), *stored)))
     };
     let shown = (1..).zip(source.lines()).map(|(number, line)| {
         let mut values: Vec<NamedValue> = Vec::new();
         let shown = |kind| !matches!(kind, Use::Unit | Use::Parameter | Use::Typed);
         for (name, _) in line.names.iter().filter(|(_, kind)| shown(*kind)) {
             let known = values.iter().any(|known| known.name == *name);
-            if let Some((of, stored)) = value(line, name).filter(|_| !known) {
-                let value = elementary(of, stored);
-                values.push(NamedValue { name: (*name).to_owned(), value, of: of.name() });
+            if let Some((declared, stored)) = value(line, name).filter(|_| !known) {
+                let value = value::shown(&declared, stored);
+                let of = declared.to_string();
+                values.push(NamedValue { name: (*name).to_owned(), value, of });
             }
         }
         ShownLine {

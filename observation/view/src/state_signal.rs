@@ -7,13 +7,13 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 use understudy_cluster::Controller;
 use understudy_ladder::{BlockKind, Element, Evaluation, Program as Ladder, Reading, visit};
-use understudy_typed::{Part, Program as TypedProgram};
+use understudy_typed::{Enumeration, Part, Program as TypedProgram};
 use understudy_wire::ProgramId;
 
 use crate::error::ViewError;
 use crate::history::History;
 use crate::model::Model;
-use crate::value::elementary;
+use crate::value::{number, shown};
 
 /// Signals of one program that are listed, at most; the first ones.
 const MAXIMUM_SIGNALS: usize = 2000;
@@ -39,7 +39,7 @@ pub struct StateSignal {
     /// Its kind.
     pub kind: StateKind,
     /// Its type, such as `BOOL`.
-    pub of: &'static str,
+    pub of: String,
     /// Its address, such as `%MX0.0`.
     pub address: Option<String>,
     /// Its description.
@@ -171,6 +171,26 @@ impl Model {
 }
 
 impl StateSignal {
+    /// Its names of values, where it is of an enumeration.
+    pub fn values(&self) -> Option<&Enumeration> {
+        match &self.place {
+            Place::Part(part) => part.values.as_deref(),
+            Place::Memory(_) | Place::Block(..) => None,
+        }
+    }
+
+    /// A number of [`Model::state_values`] as [`crate::value_of`] has the value of a point.
+    pub fn shown(&self, number: Value) -> Value {
+        let declared = match &self.place {
+            Place::Part(part) => part.declared(),
+            Place::Memory(_) | Place::Block(..) => None,
+        };
+        match declared.zip(number.as_i64()) {
+            Some((declared, stored)) => shown(&declared, stored as u64 & declared.of.mask()),
+            None => number,
+        }
+    }
+
     fn in_scan(&self, evaluation: &Evaluation) -> Value {
         match &self.place {
             Place::Memory(number) => evaluation.memory.get(*number).copied().into(),
@@ -191,8 +211,7 @@ impl StateSignal {
         let Place::Part(part) = &self.place else {
             return Value::Null;
         };
-        let stored = part.stored(state);
-        stored.map_or(Value::Null, |(of, stored)| elementary(of, stored))
+        part.stored(state).map_or(Value::Null, |(of, stored)| number(of, stored))
     }
 }
 
@@ -202,7 +221,7 @@ fn of_ladder(ladder: &Ladder) -> Vec<StateSignal> {
         .map(|(number, signal)| StateSignal {
             name: signal.name.to_string(),
             kind: StateKind::Memory,
-            of: "BOOL",
+            of: "BOOL".to_owned(),
             address: signal.address.as_ref().map(ToString::to_string),
             description: signal.description.clone(),
             place: Place::Memory(number),
@@ -217,7 +236,7 @@ fn of_ladder(ladder: &Ladder) -> Vec<StateSignal> {
                 signals.push(StateSignal {
                     name: block.name.to_string(),
                     kind,
-                    of,
+                    of: of.to_owned(),
                     address: None,
                     description: Some(format!("{} in rung {}", block.kind.word(), number + 1)),
                     place: Place::Block(number, element),
@@ -253,22 +272,23 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
         let mut address = 64 * u64::from(variable.slot);
         while address < end && signals.len() < MAXIMUM_SIGNALS {
             let part = typed.part_at(address).filter(|part| part.address == address);
-            let of = part.as_ref().and_then(|part| part.of.elementary());
-            if let Some((part, of)) = part.zip(of)
+            let declared = part.as_ref().and_then(|part| part.declared());
+            let bits = declared.as_ref().map_or(64, |declared| u64::from(declared.of.bits()));
+            if let Some((part, declared)) = part.zip(declared)
                 && !own.contains(&(address / 64))
             {
                 let is_whole = part.name == variable.name;
                 signals.push(StateSignal {
                     name: part.name.clone(),
                     kind: StateKind::Variable,
-                    of: of.name(),
+                    of: declared.to_string(),
                     address: variable.address.clone().filter(|_| is_whole),
                     description: variable.description.clone().filter(|_| is_whole),
                     place: Place::Part(part),
                 });
             }
             // Elements of an array may share a slot; all else begins at one.
-            let next = address + of.map_or(64, |of| u64::from(of.bits()));
+            let next = address + bits;
             let shares = typed.part_at(next).is_some_and(|part| part.address == next);
             address = if shares { next } else { (address / 64 + 1) * 64 };
         }

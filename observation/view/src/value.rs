@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 use understudy_cluster::Controller;
-use understudy_typed::{Elementary, Point, Points, Program};
+use understudy_typed::{Declared, Elementary, Point, Points, Program};
 use understudy_wire::{Force, Image, SignalPlace};
 
 /// The bits of a point as they are stored; nothing where the text ends before them.
@@ -14,15 +14,15 @@ pub fn stored(point: &Point, bits: &str) -> Option<u64> {
 }
 
 /// The value of a point for a program that reads it: a BOOL as true or false, an integer or bit string as a number, a real as a number or, where
-/// it is none, as null; a time as a number of nanoseconds.
+/// it is none, as null; a duration as a number of nanoseconds, a date or a time of day as a text, a value of an enumeration by its name.
 pub fn value_of(point: &Point, bits: &str) -> Option<Value> {
     let value = stored(point, bits)?;
-    Some(elementary(point.of, value))
+    Some(shown(&point.declared(), value))
 }
 
 /// The value of a point in an image, as [`value_of`] has it.
 pub(crate) fn value_in(point: &Point, image: &Image) -> Value {
-    elementary(point.of, point.get(image.words()))
+    shown(&point.declared(), point.get(image.words()))
 }
 
 /// The values of all points of an image, by name.
@@ -31,31 +31,40 @@ pub(crate) fn named(points: &Points, image: &Image) -> impl Iterator<Item = (Str
     points.map(|point| (point.name.clone(), value_in(point, image)))
 }
 
-/// An elementary value as it is stored, as [`value_of`] has it.
-pub fn elementary(of: Elementary, stored: u64) -> Value {
-    match of {
-        Elementary::Bool => Value::Bool(stored != 0),
-        of => number(of, stored),
+/// A stored value of what is declared so, as [`value_of`] has it.
+pub fn shown(declared: &Declared, stored: u64) -> Value {
+    match declared.of {
+        Elementary::Bool | Elementary::Time => number(declared.of, stored),
+        of if of.is_time() => Value::String(stored_text(declared, stored)),
+        of => match declared.value_name(stored) {
+            Some(name) => name.into(),
+            None => number(of, stored),
+        },
     }
 }
 
-/// A stored value as people read it: a BOOL as 0 or 1, a time with its unit.
-pub(crate) fn stored_text(of: Elementary, stored: u64) -> String {
-    if of.is_time() {
-        // A file has a duration in quotes.
-        return understudy_cluster::value_text(of, stored).replace('"', "");
+/// A stored value as people read it: a BOOL as 0 or 1, a duration with its unit.
+pub(crate) fn stored_text(declared: &Declared, stored: u64) -> String {
+    if declared.of.is_time() {
+        // A file has them in quotes.
+        return understudy_cluster::value_text(declared, stored).replace('"', "");
     }
-    value_text(&elementary(of, stored))
+    value_text(&shown(declared, stored))
 }
 
 /// The values of the declared points of an image as people read them: `level = 2.5, run = 1`.
 pub(crate) fn named_text(points: &Points, image: &Image) -> String {
     let points = points.iter().filter(|point| is_declared(&point.name));
     let texts = points.map(|point| {
-        let text = stored_text(point.of, point.get(image.words()));
+        let text = point_text(point, image);
         format!("{} = {text}", point.name)
     });
     texts.collect::<Vec<String>>().join(", ")
+}
+
+/// The value of a point in an image as people read it.
+pub(crate) fn point_text(point: &Point, image: &Image) -> String {
+    stored_text(&point.declared(), point.get(image.words()))
 }
 
 /// Whether a program declares the point of this name: its reset and its fault are told by events of their own.
@@ -73,9 +82,12 @@ pub(crate) fn value_text(value: &Value) -> String {
     }
 }
 
-/// The value of a point in a packed image, for drawing: a BOOL as 0 or 1, all else as [`value_of`] has it.
+/// The value of a point in a packed image, for drawing: a BOOL as 0 or 1, all else as a number.
 pub fn number_of(point: &Point, words: &[u64]) -> Value {
-    number(point.of, point.get(words))
+    match point.of {
+        Elementary::Bool => point.get(words).into(),
+        of => number(of, point.get(words)),
+    }
 }
 
 /// The same as a real number; not a number where it is none.
@@ -105,14 +117,13 @@ pub fn forced_point<'a>(controller: &'a Controller, force: &Force) -> Option<&'a
 
 /// The forced value of a point as [`value_of`] has it.
 pub fn forced_value(point: &Point, force: &Force) -> Value {
-    match point.of {
-        Elementary::Bool => Value::Bool(force.value.stored() != 0),
-        of => number(of, force.value.stored()),
-    }
+    shown(&point.declared(), force.value.stored())
 }
 
-fn number(of: Elementary, value: u64) -> Value {
+/// A stored value as a number; a BOOL as true or false.
+pub(crate) fn number(of: Elementary, value: u64) -> Value {
     match of {
+        Elementary::Bool => Value::Bool(value != 0),
         // The shortest decimal that reads back as the same binary32.
         Elementary::Real => {
             let real = f32::from_bits(value as u32).to_string();

@@ -17,7 +17,7 @@ use understudy_ladder::Program;
 use understudy_parity::reconstruct;
 use understudy_remote_io::Missing;
 use understudy_text::spelling::suggestion;
-use understudy_typed::Elementary;
+use understudy_typed::Declared;
 use understudy_wire::{Image, Member, ProgramId, Source, StationId};
 
 use crate::describe::missing_text;
@@ -72,7 +72,7 @@ pub struct Why {
         serialize_with = "type_name"
     )]
     #[schemars(with = "Option<String>")]
-    pub of: Option<Elementary>,
+    pub of: Option<Declared>,
     /// How it was reconstructed.
     pub reconstructed: Option<Reconstructed>,
     /// Configured fail-safe value, where the output is on a ramp to it.
@@ -97,8 +97,8 @@ pub struct WhyForced {
     pub unforced: Option<Value>,
 }
 
-fn type_name<S: Serializer>(of: &Option<Elementary>, serializer: S) -> Result<S::Ok, S::Error> {
-    of.map(Elementary::name).serialize(serializer)
+fn type_name<S: Serializer>(of: &Option<Declared>, serializer: S) -> Result<S::Ok, S::Error> {
+    of.as_ref().map(Declared::to_string).serialize(serializer)
 }
 
 /// How an output was reconstructed: equation (12) with its numbers.
@@ -155,7 +155,7 @@ pub struct Reason {
         serialize_with = "type_name"
     )]
     #[schemars(with = "Option<String>")]
-    pub of: Option<Elementary>,
+    pub of: Option<Declared>,
     /// From the origin of the run.
     pub cycle: i64,
     /// Time of day of the cycle.
@@ -286,7 +286,7 @@ impl Model {
             inputs_text: sampled
                 .next()
                 .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
-            of: text.and_then(|_| typed.part(name)?.of.elementary()),
+            of: text.and_then(|_| typed.part(name)?.declared()),
             ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: decided.and_then(|driven| self.reconstructed(program, step, driven)),

@@ -177,7 +177,7 @@ function forcing(member, signal, because, give) {
     const { point } = chosen();
     number.hidden = point.type === "BOOL";
     bit.hidden = !number.hidden;
-    setText(type, number.hidden ? "" : `${point.type}${point.operator?.unit ? `, ${point.operator.unit}` : ""}${point.type === "TIME" ? ", such as 1.5s" : ""}`);
+    setText(type, number.hidden ? "" : `${point.type}${point.operator?.unit ? `, ${point.operator.unit}` : ""}${point.type === "TIME" ? ", such as 1.5s" : ""}${point.values ? `: ${Object.values(point.values).join(", ")}` : ""}`);
     force.disabled = Boolean(down) || (!number.hidden && number.value.trim() === "");
   };
   fit();

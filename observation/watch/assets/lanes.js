@@ -17,13 +17,13 @@ function extremes(signal, isNumber) {
 
 // Each signal has a lane of its own, the first on top. A BOOL is at the bottom of it where it is 0 and above where it is 1; a number lies between its
 // least and its greatest value, which the axis shows.
-export function lanesOf(signals, typeOf, unitOf) {
+export function lanesOf(signals, signalOf, unitOf) {
   let base = 0;
   const lanes = signals.map((signal, index) => {
-    const type = typeOf(index);
+    const { type = "BOOL", values } = signalOf(index) ?? {};
     const isNumber = type !== "BOOL";
     const unit = unitOf(index);
-    return { name: unit ? `${signal.name}, ${unit}` : signal.name, type, isNumber, height: isNumber ? HIGH : 1, limits: isNumber ? signal.limits : [], ...extremes(signal, isNumber) };
+    return { name: unit ? `${signal.name}, ${unit}` : signal.name, type, values, isNumber, height: isNumber ? HIGH : 1, limits: isNumber ? signal.limits : [], ...extremes(signal, isNumber) };
   });
   for (const lane of [...lanes].reverse()) {
     lane.base = base;
@@ -41,10 +41,13 @@ export function heightOf(lane, value) {
   return lane.base + 0.2 + share * (lane.height - 0.7);
 }
 
+// A value in words: that of an enumeration by its name.
+export const laneText = (value, lane) => lane.values?.[value] ?? valueText(value, lane.type);
+
 // A number of the axis, with as many digits as a person compares.
 function axisText(value, lane) {
   const isLong = typeof value === "number" && !Number.isInteger(value);
-  return valueText(isLong ? Number(value.toPrecision(4)) : value, lane.type);
+  return laneText(isLong ? Number(value.toPrecision(4)) : value, lane);
 }
 
 // Labels of a lane: the name, and the least and the greatest value; of one that does not change its value.

@@ -136,7 +136,7 @@ function makeControl(program, input, index) {
     say("", "");
     yes.focus();
   };
-  const setter = (kind === "pulse" ? makePulse : kind === "level" ? makeLevel : makeSetpoint)(parts, write, say);
+  const setter = (kind === "pulse" ? makePulse : kind === "level" ? makeLevel : input.values ? makeChoice : makeSetpoint)(parts, write, say);
   const refresh = () => {
     const shown = kind === "setpoint" ? withUnit(input, numberText(input, parts.sampled)) : valueText(parts.sampled);
     setText(value, `${shown}${parts.busy ? " …" : ""}`);
@@ -187,6 +187,38 @@ function makeLevel(parts, write) {
     setText(button.lastChild, { true: "on", false: "off" }[parts.sampled] ?? "?");
   };
   return { element: el("div", { class: "control-setter" }, button), targets: [button], focus: () => button.focus(), show };
+}
+
+// The values of an enumeration. While a person chooses, the list does not follow the sampled value.
+function makeChoice(parts, write) {
+  const { key, input } = parts;
+  const numbers = Object.entries(input.values).map(([number, name]) => [Number(number), name]);
+  const numberOf = (name) => numbers.find(([, known]) => known === name)?.[0];
+  const [low, high] = [input.operator.low, input.operator.high].map(numberOf);
+  const allowed = numbers.filter(([number]) => number >= low && number <= high).sort(([one], [other]) => one - other);
+  let chosen = null;
+  let isBlocked = true;
+  const list = el("select", { class: "entry", "aria-labelledby": `${key}-title`, change: () => { chosen = list.value; refresh(); } },
+    el("option", { value: "" }, "choose …"), allowed.map(([, name]) => el("option", { value: name }, name)));
+  const button = el("button", { type: "submit" }, "Write");
+  const form = el("form", { class: "control-setter", submit: (event) => {
+    event.preventDefault();
+    if (!button.disabled) {
+      write(list.value);
+    }
+  } }, list, button);
+  const refresh = () => {
+    if (chosen === null) {
+      list.value = numberOf(parts.sampled) === undefined ? "" : parts.sampled;
+    }
+    list.disabled = isBlocked;
+    button.disabled = isBlocked || list.value === "";
+  };
+  const show = (blocked) => {
+    isBlocked = blocked;
+    refresh();
+  };
+  return { element: form, targets: [list, button], focus: () => list.focus(), show, written: () => { chosen = null; } };
 }
 
 // An entry and a slider between the limits. While a person types, the entry does not follow the sampled value.

@@ -3,12 +3,12 @@
 import { changed } from "/address.js";
 import { act, ask, toast } from "/ask.js";
 import { csvOf, csvOfColumns, reader, saveCsv, savePng } from "/download.js";
-import { el, keyed, setText, valueText } from "/element.js";
+import { el, keyed, setText } from "/element.js";
 import { keep, kept } from "/kept.js";
 import { chooser, find, load } from "/signals.js";
 import { goTo, isLive, state } from "/time.js";
 import { bandPlugin, limitPlugin } from "/bands.js";
-import { heightOf, labelsOf, lanesOf, tickStep, ticks } from "/lanes.js";
+import { heightOf, labelsOf, laneText, lanesOf, tickStep, ticks } from "/lanes.js";
 import { bandLegend } from "/legend.js";
 import { clock, clockAndZone, clockOf, dayOf, local, timeOf } from "/zone.js";
 
@@ -277,9 +277,9 @@ function rowsOf(lanes) {
 function wordsAt(lane, signal, values, place) {
   const range = answer.column ? signal.columns[place >> 1] : null;
   if (range && range[0] !== range[1]) {
-    return `${valueText(range[0], lane.type)} … ${valueText(range[1], lane.type)}`;
+    return `${laneText(range[0], lane)} … ${laneText(range[1], lane)}`;
   }
-  return values[place] === null ? "not known" : valueText(values[place], lane.type);
+  return values[place] === null ? "not known" : laneText(values[place], lane);
 }
 
 // The ticks of the axis of time, with their words: round times of day, and the cycle as the second scale.
@@ -301,7 +301,7 @@ function timeAxis(width) {
 
 function draw() {
   const place = id("trend-plot");
-  const lanes = lanesOf(answer.signals, (index) => find(answer.ids[index])?.type ?? "BOOL", unitOf);
+  const lanes = lanesOf(answer.signals, (index) => find(answer.ids[index]), unitOf);
   const height = lanes.reduce((sum, lane) => sum + lane.height, 0);
   const letters = place.clientWidth < 700 ? 16 : 30;
   const labels = lanes.flatMap((lane) => labelsOf(lane, letters)).sort(([one], [other]) => one - other);

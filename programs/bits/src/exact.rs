@@ -1,6 +1,7 @@
 //! The circuit that does in every scan what the program does.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
+use std::fmt;
 
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Operation, Variable as Bit};
 use understudy_typed::{Comparison, Elementary, Program};
@@ -30,11 +31,22 @@ pub struct Gap {
     pub what: String,
     /// Its type.
     pub of: Elementary,
+    /// The routine and the line of the statement that computes or reads it first.
+    pub at: Option<(String, u32)>,
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "`{}` : {}", self.what, self.of)?;
+        match &self.at {
+            Some((routine, line)) => write!(formatter, " ({routine}, line {line})"),
+            None => Ok(()),
+        }
+    }
 }
 
 fn gaps(gaps: &[Gap]) -> String {
-    let shown: Vec<String> =
-        gaps.iter().take(3).map(|gap| format!("`{}` : {}", gap.what, gap.of)).collect();
+    let shown: Vec<String> = gaps.iter().take(3).map(Gap::to_string).collect();
     let more = match gaps.len().saturating_sub(shown.len()) {
         0 => String::new(),
         more => format!(" and {more} more"),
@@ -144,7 +156,7 @@ impl Exact {
         let mut gaps = derivation.gaps_among(&system, &live);
         let points = program.inputs.iter().chain(&program.outputs);
         for point in points.filter(|point| point.of.is_real()) {
-            gaps.insert(Gap { what: point.name.clone(), of: point.of });
+            gaps.insert(Gap { what: point.name.clone(), of: point.of, at: None });
         }
         if !gaps.is_empty() {
             return Err(Inexact::Gaps(gaps.into_iter().collect()));
@@ -232,7 +244,12 @@ impl Derivation {
             Bit::Register(_) => None,
         });
         let terms = inputs.filter_map(|input| gap(&self.meanings[input]));
-        terms.map(|term| Gap { what: system.describe(term), of: system.terms.of(term) }).collect()
+        let gap = |term| Gap {
+            what: system.describe(term),
+            of: system.terms.of(term),
+            at: system.made_at(term),
+        };
+        terms.map(gap).collect()
     }
 }
 

@@ -18,7 +18,7 @@ use understudy_typed::{
 };
 
 use self::timers::Timers;
-use crate::term::{Term, Terms};
+use crate::term::{Made, Term, Terms};
 
 /// Turns of a loop whose condition depends on values.
 const UNKNOWN_TURNS: u32 = 64;
@@ -70,7 +70,8 @@ pub(super) struct Execution<'a> {
     turns: u32,
     /// Statements that were executed.
     executed: usize,
-    line: u32,
+    /// Routines of the programs that were added before.
+    routines: u32,
 }
 
 /// The routine that runs and the slot of its instance.
@@ -119,10 +120,10 @@ impl<'a> Execution<'a> {
         cells: &'a mut dyn Cells,
         elapsed: Term,
         timers: &'a mut Timers,
+        routines: usize,
     ) -> Self {
         let (path, faulted) = (terms.boolean(true), terms.boolean(false));
-        let routines = program.routines.iter();
-        let initial = routines.flat_map(|routine| &routine.initial);
+        let initial = program.routines.iter().flat_map(|routine| &routine.initial);
         let frames = initial.map(|initial| (u64::from(initial.slot), initial.value));
         let frames = frames.collect();
         Self {
@@ -138,7 +139,7 @@ impl<'a> Execution<'a> {
             timers,
             turns: 0,
             executed: 0,
-            line: 0,
+            routines: routines as u32,
         }
     }
 
@@ -210,8 +211,8 @@ impl<'a> Execution<'a> {
     }
 
     /// Gives a point beyond its subrange the end of it, as the begin of a scan does with inputs and its end with outputs.
-    pub(super) fn limit(&mut self, slot: u32, declared: Declared) {
-        let Declared { of, range: Some(range) } = declared else {
+    pub(super) fn limit(&mut self, slot: u32, declared: &Declared) {
+        let &Declared { of, range: Some(range), .. } = declared else {
             return;
         };
         let address = 64 * u64::from(slot);
@@ -227,7 +228,7 @@ impl<'a> Execution<'a> {
     fn unsupported<T>(&self, context: Context, what: impl Into<String>) -> Result<T> {
         Err(Unsupported {
             routine: self.program.routine(context.routine).name.clone(),
-            line: self.line,
+            line: self.terms.statement.line,
             what: what.into(),
         })
     }
@@ -414,7 +415,8 @@ impl<'a> Execution<'a> {
     }
 
     fn statement(&mut self, context: Context, statement: &Statement) -> Result<Left> {
-        self.line = statement.line;
+        let made = Made { routine: self.routines + context.routine.0, line: statement.line };
+        self.terms.statement = made;
         let mut left = self.staying();
         let yes = self.terms.boolean(true);
         match &statement.kind {
@@ -452,7 +454,7 @@ impl<'a> Execution<'a> {
             StatementKind::Continue => left.next = yes,
             StatementKind::Return => left.back = yes,
         }
-        self.line = statement.line;
+        self.terms.statement = made;
         Ok(left)
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::RangeInclusive;
 
-use understudy_typed::{Comparison, Elementary, Part, Point, Program, Type};
+use understudy_typed::{Comparison, Declared, Elementary, Part, Point, Program};
 
 use crate::circuit::boundaries::position;
 use crate::execute::timers::Counted;
@@ -99,8 +99,10 @@ pub struct System {
     pub(crate) wanted: BTreeSet<String>,
     /// Numbers that properties compare: after the scan, an input in the scan.
     pub numbers: Vec<(String, Term)>,
-    /// Names of the values of enumerations.
-    pub values: HashMap<String, Vec<(String, i64)>>,
+    /// Declarations of what has an enumeration.
+    pub enumerated: HashMap<String, Declared>,
+    /// The names of the routines of all programs.
+    pub(crate) routines: Vec<String>,
 }
 
 /// What variables of a program begin with, by address, where it takes the place of another one: what nothing writes keeps that too.
@@ -132,12 +134,6 @@ impl Begins {
             },
         }
     }
-}
-
-/// The names and values of an enumeration.
-fn named_values(program: &Program, of: &Type) -> Option<Vec<(String, i64)>> {
-    let Type::Enumeration(id, _) = of else { return None };
-    program.enumerations.get(id.0 as usize).map(|found| found.values.clone())
 }
 
 /// An input of a program in a system.
@@ -191,7 +187,8 @@ impl System {
             any_values: Vec::new(),
             wanted: BTreeSet::new(),
             numbers: Vec::new(),
-            values: HashMap::new(),
+            enumerated: HashMap::new(),
+            routines: Vec::new(),
         }
     }
 
@@ -262,12 +259,9 @@ impl System {
         program: &Program,
         after: &HashMap<u64, Term>,
     ) {
-        let has_names = !program.enumerations.is_empty();
-        for point in program.inputs.iter().chain(&program.outputs).filter(|_| has_names) {
-            let part = program.part(&point.name);
-            if let Some(values) = part.and_then(|part| named_values(program, &part.of)) {
-                self.values.insert(format!("{prefix}{}", point.name), values);
-            }
+        let points = program.inputs.iter().chain(&program.outputs);
+        for point in points.filter(|point| point.values.is_some()) {
+            self.enumerated.insert(format!("{prefix}{}", point.name), point.declared());
         }
         for name in self.wanted.clone() {
             let Some(own) = name.strip_prefix(prefix) else { continue };
@@ -281,8 +275,9 @@ impl System {
             }
             let kept = || after.get(&part.as_ref()?.address).copied();
             let Some(term) = given.or_else(kept) else { continue };
-            if let Some(values) = part.and_then(|part| named_values(program, &part.of)) {
-                self.values.insert(name.clone(), values);
+            let declared = part.and_then(|part| part.declared());
+            if let Some(declared) = declared.filter(|declared| declared.values.is_some()) {
+                self.enumerated.insert(name.clone(), declared);
             }
             self.numbers.push((name, term));
         }
@@ -290,9 +285,8 @@ impl System {
 
     /// A stored value of what has this name, as a person reads it.
     pub fn text(&self, name: &str, of: Elementary, stored: u64) -> String {
-        let values = self.values.get(name).into_iter().flatten();
-        let mut named = values.filter(|(_, value)| i128::from(*value) == of.signed(stored));
-        named.next().map_or_else(|| of.text(stored), |(value, _)| value.clone())
+        let declared = self.enumerated.get(name);
+        declared.map_or_else(|| of.text(stored), |declared| declared.text(stored))
     }
 
     /// Adds to the BOOLs that properties can name whether `holds` has been TRUE in every scan so far.
@@ -308,6 +302,12 @@ impl System {
             Variable::Input(number) => self.inputs[number as usize].name.clone(),
             Variable::Cell(number) => self.cells[number as usize].name.clone(),
         }
+    }
+
+    /// The routine and the line of the statement that made a term first.
+    pub(crate) fn made_at(&self, term: Term) -> Option<(String, u32)> {
+        let made = self.terms.made(term)?;
+        Some((self.routines.get(made.routine as usize)?.clone(), made.line))
     }
 
     /// The term as a person reads it.

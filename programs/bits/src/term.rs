@@ -45,6 +45,17 @@ pub struct Terms {
     /// Selections inside each other, of each term that is none of bits.
     depths: Vec<u32>,
     depth: u32,
+    /// The statement that is executed now.
+    pub(crate) statement: Made,
+    /// The statement that made each term first.
+    made: Vec<Made>,
+}
+
+/// A statement: its routine, counted over the programs of a system, and its line; line 0 outside of all.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Made {
+    pub(crate) routine: u32,
+    pub(crate) line: u32,
 }
 
 impl Terms {
@@ -94,11 +105,17 @@ impl Terms {
             }
             _ => 0,
         };
+        self.made.push(self.statement);
         self.depths.push(depth);
         self.depth = self.depth.max(depth);
         self.nodes.push(key.clone());
         self.known.insert(key, next);
         next
+    }
+
+    /// The statement that made a term first; nothing for what none made.
+    pub(crate) fn made(&self, term: Term) -> Option<Made> {
+        self.made.get(term.0 as usize).copied().filter(|made| made.line > 0)
     }
 
     /// The most selections inside each other.

@@ -10,7 +10,7 @@ use understudy_logic::{Circuit, Scan};
 use understudy_typed::{Elementary, Machine, Point, Points, Program};
 
 pub use self::digest::{Digest, digest};
-pub use self::value::{stored_value, typed_value, value_text, whole_number};
+pub use self::value::{stored_value, typed_value, value_text};
 
 /// A compiled program; cheap to share, it holds no state.
 #[derive(Debug, Clone)]

@@ -179,6 +179,24 @@ fn enumerations_are_named() {
 }
 
 #[test]
+fn elements_of_arrays_are_points() {
+    let text = "PROGRAM main
+        VAR_INPUT on : ARRAY[1..3] OF BOOL := [TRUE, FALSE, TRUE]; n : ARRAY[0..1,0..1] OF INT; END_VAR
+        VAR_OUTPUT off : ARRAY[1..3] OF BOOL; sum : INT; END_VAR
+        VAR i : INT; END_VAR
+        FOR i := 1 TO 3 DO off[i] := NOT on[i]; END_FOR;
+        sum := n[0,0] + 10 * n[0,1] + 100 * n[1,0] + 1000 * n[1,1]; END_PROGRAM";
+    let found = program(text);
+    let names: Vec<&str> = found.inputs.names().collect();
+    let inputs =
+        ["on[1]", "on[2]", "on[3]", "n[0,0]", "n[0,1]", "n[1,0]", "n[1,1]", "program.reset"];
+    assert_eq!(names, inputs);
+    let initials: Vec<u64> = found.inputs.iter().take(3).map(|point| point.initial).collect();
+    assert_eq!(initials, [1, 0, 1]);
+    check(text, &[(&[1, 0, 0, 1, 2, 3, 4], "0 1 1 4321"), (&[0, 1, 1, 0, 0, 0, 1], "1 0 0 1000")]);
+}
+
+#[test]
 fn loops_and_cases_end_where_they_must() {
     once(
         "x : INT;",

@@ -31,7 +31,7 @@ pub struct Program {
     /// Operations that the loops of one scan may take together; see `Cost`.
     pub budget: u64,
     /// Enumerated types.
-    pub enumerations: Vec<Enumeration>,
+    pub enumerations: Vec<Arc<Enumeration>>,
     /// Structures, and the memory of function blocks.
     pub structures: Vec<Structure>,
     /// What can be run.

@@ -5,8 +5,9 @@
 
 use std::collections::HashMap;
 use std::fmt;
+use std::sync::Arc;
 
-use crate::types::Elementary;
+use crate::types::{Elementary, Enumeration};
 
 /// An input or output of a program.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,6 +18,8 @@ pub struct Point {
     pub of: Elementary,
     /// The least and the greatest value of the subrange that it is declared with.
     pub range: Option<(i128, i128)>,
+    /// The names of its values, where it is declared with an enumeration.
+    pub values: Option<Arc<Enumeration>>,
     /// Its first bit in the image.
     pub bit: u32,
     /// Where it stands in the program's state, as a slot.
@@ -25,18 +28,29 @@ pub struct Point {
     pub initial: u64,
 }
 
-/// Type and subrange, as a declaration writes them: `INT`, `INT (0..7)`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Type, subrange and names of values, as a declaration writes them: `INT`, `INT (0..7)`, `(Off, Auto)`.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Declared {
     /// The type.
     pub of: Elementary,
     /// The least and the greatest value of a subrange.
     pub range: Option<(i128, i128)>,
+    /// The names of the values of an enumeration.
+    pub values: Option<Arc<Enumeration>>,
 }
 
 impl Declared {
+    /// The article of its type: `an INT`, `a MODE`.
+    pub fn article(&self) -> &'static str {
+        let Some(known) = &self.values else {
+            return self.of.article();
+        };
+        let is_vowel = |first: char| "aeiou".contains(first.to_ascii_lowercase());
+        if known.name.starts_with(is_vowel) { "an" } else { "a" }
+    }
+
     /// Whether every value of `sender` is one of this declaration, stored in the same bits.
-    pub fn takes(self, sender: Self) -> bool {
+    pub fn takes(&self, sender: &Self) -> bool {
         let Some((low, high)) = self.range else {
             return self.of == sender.of;
         };
@@ -45,23 +59,59 @@ impl Declared {
     }
 
     /// Whether a stored value is within the subrange.
-    pub fn contains(self, stored: u64) -> bool {
+    pub fn contains(&self, stored: u64) -> bool {
         self.limited(stored) == stored & self.of.mask()
     }
 
     /// The stored value of the subrange that is nearest to a stored value.
-    pub fn limited(self, stored: u64) -> u64 {
+    pub fn limited(&self, stored: u64) -> u64 {
         let stored = stored & self.of.mask();
         let limited = |(low, high)| self.of.signed(stored).clamp(low, high) as u64 & self.of.mask();
         self.range.map_or(stored, limited)
+    }
+
+    /// A stored value as a program writes it: `Auto`, and all else as [`Elementary::text`] has it.
+    pub fn text(&self, stored: u64) -> String {
+        self.value_name(stored).map_or_else(|| self.of.text(stored), str::to_owned)
+    }
+
+    /// The name of a stored value of an enumeration; of several the first.
+    pub fn value_name(&self, stored: u64) -> Option<&str> {
+        let number = self.of.signed(stored);
+        let mut values = self.values.as_ref()?.values.iter();
+        let (name, _) = values.find(|(_, value)| i128::from(*value) == number)?;
+        Some(name)
+    }
+
+    /// The stored value of this name of an enumeration, `Auto` or `MODE#Auto`, in any case of letters.
+    pub fn value_named(&self, text: &str) -> Option<u64> {
+        let known = self.values.as_ref()?;
+        let name = match text.rsplit_once('#') {
+            Some((of, name)) if of.eq_ignore_ascii_case(&known.name) => name,
+            Some(_) => return None,
+            None => text,
+        };
+        let (_, value) = known.values.iter().find(|(it, _)| it.eq_ignore_ascii_case(name))?;
+        Some(*value as u64 & self.of.mask())
+    }
+}
+
+impl From<Elementary> for Declared {
+    fn from(of: Elementary) -> Self {
+        Self { of, range: None, values: None }
     }
 }
 
 impl fmt::Display for Declared {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.range {
-            Some((low, high)) => write!(formatter, "{} ({low}..{high})", self.of),
-            None => self.of.fmt(formatter),
+        match (&self.values, self.range) {
+            (Some(known), _) if !known.name.is_empty() => formatter.write_str(&known.name),
+            (Some(known), _) => {
+                let names: Vec<&str> = known.values.iter().map(|(name, _)| name.as_str()).collect();
+                write!(formatter, "({})", names.join(", "))
+            }
+            (None, Some((low, high))) => write!(formatter, "{} ({low}..{high})", self.of),
+            (None, None) => self.of.fmt(formatter),
         }
     }
 }
@@ -69,7 +119,7 @@ impl fmt::Display for Declared {
 impl Point {
     /// How it is declared.
     pub fn declared(&self) -> Declared {
-        Declared { of: self.of, range: self.range }
+        Declared { of: self.of, range: self.range, values: self.values.clone() }
     }
 
     /// Its value in a packed image, zero-extended.
@@ -103,15 +153,15 @@ pub struct Points {
 impl Points {
     /// Appends a point at the next multiple of its width.
     pub fn push(&mut self, name: impl Into<String>, of: Elementary, slot: u32) {
-        self.push_declared(name, Declared { of, range: None }, slot);
+        self.push_declared(name, of.into(), slot);
     }
 
-    /// As [`Self::push`], of a point that may have a subrange.
+    /// As [`Self::push`], of a point that may have a subrange or names of values.
     pub fn push_declared(&mut self, name: impl Into<String>, declared: Declared, slot: u32) {
-        let Declared { of, range } = declared;
+        let Declared { of, range, values } = declared;
         let bit = self.width.next_multiple_of(of.bits());
         self.width = bit + of.bits();
-        self.points.push(Point { name: name.into(), of, range, bit, slot, initial: 0 });
+        self.points.push(Point { name: name.into(), of, range, values, bit, slot, initial: 0 });
     }
 
     /// Gives each point the initial value of its variable.

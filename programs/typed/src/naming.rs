@@ -1,8 +1,14 @@
 //! Variables by name and by address: `pid.integral`, `table[3]`.
 
+use std::sync::Arc;
+
 use crate::form::{Program, Variable};
+use crate::image::Declared;
 use crate::operation::{number_text, text_literal};
-use crate::types::{Array, Elementary, Type};
+use crate::types::{Array, Elementary, Enumeration, Type};
+
+/// Nanoseconds of a day.
+const DAY: u64 = 86_400_000_000_000;
 
 /// A variable without parts, or such a part of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,15 +17,22 @@ pub struct Part {
     pub name: String,
     /// Its type.
     pub of: Type,
+    /// The names of its values, where its type is an enumeration.
+    pub values: Option<Arc<Enumeration>>,
     /// Its place in memory: 64 · slot + bit.
     pub address: u64,
 }
 
 impl Part {
+    /// How its value is declared; nothing where it has parts, or is a text.
+    pub fn declared(&self) -> Option<Declared> {
+        Some(Declared { values: self.values.clone(), ..self.of.elementary()?.into() })
+    }
+
     /// The value in a state as it is written in IEC 61131-3; nothing where it has parts, or where the state ends before it.
     pub fn text(&self, state: &[u64]) -> Option<String> {
-        if let Some((of, stored)) = self.stored(state) {
-            return Some(of.text(stored));
+        if let Some(((_, stored), declared)) = self.stored(state).zip(self.declared()) {
+            return Some(declared.text(stored));
         }
         let Type::Text(capacity) = self.of else {
             return None;
@@ -45,9 +58,38 @@ impl Elementary {
     pub fn text(self, stored: u64) -> String {
         number_text::write(self, stored)
     }
+
+    /// The stored value of a date, a time of day or both as [`Self::text`] writes it, with its keyword, its short form or none before the `#`.
+    pub fn moment(self, text: &str) -> Option<u64> {
+        let text = text.to_ascii_uppercase();
+        let stored = number_text::read(self, text.as_bytes());
+        if self == Self::TimeOfDay && stored >= DAY {
+            return None;
+        }
+        let written = self.text(stored);
+        let (_, bare) = written.split_once('#')?;
+        let keyword = format!("{self}#{bare}");
+        [written.as_str(), bare, &keyword].contains(&text.as_str()).then_some(stored)
+    }
 }
 
 impl Program {
+    /// How a value of an elementary or enumerated type is declared; nothing for a type with parts.
+    pub fn declared(&self, of: &Type) -> Option<Declared> {
+        Some(Declared { values: self.values_of(of), ..of.elementary()?.into() })
+    }
+
+    fn values_of(&self, of: &Type) -> Option<Arc<Enumeration>> {
+        match of {
+            Type::Enumeration(id, _) => self.enumerations.get(id.0 as usize).cloned(),
+            _ => None,
+        }
+    }
+
+    fn new_part(&self, name: String, of: Type, address: u64) -> Part {
+        Part { values: self.values_of(&of), name, of, address }
+    }
+
     /// A type as it is written; `a structure` and `an enumeration of INT` where it has no name.
     pub fn type_name(&self, of: &Type) -> String {
         match of {
@@ -84,11 +126,8 @@ impl Program {
 
     /// The part of a variable that lies at an address.
     fn part_of(&self, variable: &Variable, address: u64) -> Option<Part> {
-        let mut part = Part {
-            name: variable.name.clone(),
-            of: variable.of.clone(),
-            address: 64 * u64::from(variable.slot),
-        };
+        let first = 64 * u64::from(variable.slot);
+        let mut part = self.new_part(variable.name.clone(), variable.of.clone(), first);
         loop {
             let within = address - part.address;
             match part.of.clone() {
@@ -113,7 +152,7 @@ impl Program {
                     part.address += element * array.stride();
                     part.of = array.element.clone();
                 }
-                _ => return Some(part),
+                _ => return Some(self.new_part(part.name, part.of, part.address)),
             }
         }
     }
@@ -136,7 +175,8 @@ impl Program {
                 for field in fields.filter(|field| !field.is_reference) {
                     let name = format!("{}.{}", part.name, field.name);
                     let address = part.address + 64 * u64::from(field.slot);
-                    self.add_leaves(Part { name, of: field.of.clone(), address }, most, leaves);
+                    let part = self.new_part(name, field.of.clone(), address);
+                    self.add_leaves(part, most, leaves);
                 }
             }
             Type::Array(array) => {
@@ -144,11 +184,8 @@ impl Program {
                 for (element, indices) in elements.take(most) {
                     let name = format!("{}{indices}", part.name);
                     let address = part.address + element * array.stride();
-                    self.add_leaves(
-                        Part { name, of: array.element.clone(), address },
-                        most,
-                        leaves,
-                    );
+                    let part = self.new_part(name, array.element.clone(), address);
+                    self.add_leaves(part, most, leaves);
                 }
             }
             _ => leaves.push(part),
@@ -174,11 +211,8 @@ impl Program {
             found.max_by_key(|known| (known.name.len(), name.starts_with(&known.name)))
         };
         let variable = whole.or_else(within)?;
-        let mut part = Part {
-            name: variable.name.clone(),
-            of: variable.of.clone(),
-            address: 64 * u64::from(variable.slot),
-        };
+        let first = 64 * u64::from(variable.slot);
+        let mut part = self.new_part(variable.name.clone(), variable.of.clone(), first);
         let mut rest = match whole {
             Some(_) => "",
             None => &name[variable.name.len()..],
@@ -209,7 +243,7 @@ impl Program {
                 _ => return None,
             }
         }
-        Some(part)
+        Some(self.new_part(part.name, part.of, part.address))
     }
 }
 
@@ -244,7 +278,7 @@ impl<'p> Parts<'p> {
 }
 
 /// The indices of an element, `[3]` or `[1,2]`.
-pub(crate) fn indices(array: &Array, element: u64) -> Option<String> {
+pub fn indices(array: &Array, element: u64) -> Option<String> {
     if element >= array.length() {
         return None;
     }

@@ -6,8 +6,22 @@
 //! | integers, bit strings | decimal |
 //! | REAL, LREAL | the hexadecimal bit pattern, 8 or 16 digits; read also as a decimal number with a point or an exponent |
 //! | TIME, DATE and their like | nanoseconds, decimal |
+//! | enumerations | the name of the value; read also as a decimal number |
 
+use crate::image::Declared;
 use crate::types::Elementary;
+
+impl Declared {
+    /// A stored value as it is written in a file of scans.
+    pub fn write(&self, stored: u64) -> String {
+        self.value_name(stored).map_or_else(|| self.of.write(stored), str::to_owned)
+    }
+
+    /// The stored value of a text of a file of scans; `None` where it is none of this declaration. A number beyond a subrange is one.
+    pub fn read(&self, text: &str) -> Option<u64> {
+        self.value_named(text).or_else(|| self.of.read(text))
+    }
+}
 
 impl Elementary {
     /// A stored value as it is written in a file of scans.

@@ -50,8 +50,8 @@ impl Priority {
 /// Condition of an alarm. Limits are stored values of the type of the signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AlarmCondition {
-    /// The signal has this value.
-    Is(bool),
+    /// The signal, a BOOL or an enumeration, has this stored value.
+    Is(u64),
     /// The signal is above the limit.
     Above {
         /// The condition begins above this value.
@@ -74,7 +74,7 @@ impl AlarmCondition {
     pub fn holds(&self, of: Elementary, value: u64, before: Option<bool>) -> Option<bool> {
         let at_most = |one, other| in_order(of, one, other);
         let (begins, ends) = match *self {
-            Self::Is(expected) => return Some((value != 0) == expected),
+            Self::Is(expected) => return Some(value == expected),
             Self::Above { limit, over } => (!at_most(value, limit), at_most(value, over)),
             Self::Below { limit, over } => (!at_most(limit, value), at_most(over, value)),
         };
@@ -132,7 +132,7 @@ mod tests {
         assert_eq!(below.holds(of, (-4i16) as u16 as u64, None), Some(true));
         assert_eq!(below.holds(of, 1, Some(true)), Some(true));
         assert_eq!(below.holds(of, 2, Some(true)), Some(false));
-        let is = AlarmCondition::Is(false);
+        let is = AlarmCondition::Is(0);
         assert_eq!(is.holds(Elementary::Bool, 0, None), Some(true));
     }
 }

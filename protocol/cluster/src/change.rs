@@ -382,8 +382,8 @@ pub fn changed_initials(before: &Code, after: &Code, paths: &[CarriedPath]) -> V
         let [old, new] = [programs[0].part(was), programs[1].part(&path.path)];
         let parts = [old?, new?];
         let values = [0, 1].map(|side: usize| {
-            let (of, stored) = parts[side].stored(&states[side])?;
-            Some(of.text(stored))
+            let (_, stored) = parts[side].stored(&states[side])?;
+            Some(parts[side].declared()?.text(stored))
         });
         let [slots, others] = [0, 1].map(|side: usize| {
             let first = (parts[side].address / 64) as usize;

@@ -11,7 +11,6 @@ use std::time::Duration;
 
 use understudy_interchange::Source;
 use understudy_text::duration;
-use understudy_typed::Elementary;
 use understudy_wire::MAXIMUM_STATE_BITS;
 
 use crate::address::MAXIMUM_NAME_LENGTH;
@@ -252,14 +251,9 @@ controller = \"{name}\"
 "
     );
     for output in outputs {
-        let of = output.declared.of;
-        let line = match of.is_time() && of != Elementary::Time {
-            true => format!("# `{}` is {of}: no value can be written here", output.name),
-            false => {
-                let safe = value_text(of, output.nearest(0) as u64 & of.mask());
-                format!("{} = {safe}", key(&output.name))
-            }
-        };
+        let declared = &output.declared;
+        let safe = value_text(declared, output.nearest(0) as u64 & declared.of.mask());
+        let line = format!("{} = {safe}", key(&output.name));
         let _ = match &output.note {
             Some(note) => writeln!(text, "{line}  # {note}"),
             None => writeln!(text, "{line}"),

@@ -71,8 +71,6 @@ pub(crate) enum Kind {
     Value,
     /// `true` or `false`; `false` where absent.
     Flag,
-    /// `true` or `false`, without a default.
-    State,
     /// `input:N` or `holding:N`.
     Register,
 }
@@ -259,8 +257,8 @@ pub(crate) static OPERATOR_INPUT: Section = Section {
         key role: word(&ROLES), "the lowest role that may write it";
         key confirm: Kind::Flag, "whether the page asks before it writes";
         key duration: time(Duration::from_micros(200), Duration::from_secs(60), Duration::from_millis(200)), "time for which a pulse is TRUE, rounded up to whole cycles";
-        key low: Kind::Value, "lowest value of a setpoint; required there";
-        key high: Kind::Value, "highest value of a setpoint; required there";
+        key low: Kind::Value, "lowest value of a setpoint; required there, but for an enumeration";
+        key high: Kind::Value, "highest value of a setpoint; required there, but for an enumeration";
         key unit: Kind::Text, "unit of a setpoint, such as `mm/s`";
         key initial: Kind::Value, "value before the first write; `false`, or the lowest value of a setpoint where absent";
         key retain: Kind::Flag, "whether a level or a setpoint keeps its value over a power failure; the initial value otherwise";
@@ -304,7 +302,7 @@ pub(crate) static ALARM: Section = Section {
     keys: keys! {
         required signal: Kind::Text, "controller and input or output, such as `tank.level`";
         key name: Kind::Name, "names the alarm; the signal where absent";
-        key when: Kind::State, "value of a BOOL at which the condition holds; an alarm has either `when`, `above` or `below`";
+        key when: Kind::Value, "value of a BOOL or an enumeration at which the condition holds, such as `true` or `\"Fault\"`; an alarm has either `when`, `above` or `below`";
         key above: Kind::Value, "limit of a number or a TIME above which the condition holds";
         key below: Kind::Value, "limit of a number or a TIME below which the condition holds";
         key hysteresis: Kind::Value, "distance from the limit at which the condition is over; 0 where absent";
@@ -468,8 +466,8 @@ impl Kind {
             Self::Command => {
                 "a list of texts in quotes, such as [\"logger\", \"-t\", \"understudy\"]".into()
             }
-            Self::Value => "a value of the signal, such as `true`, 12.5 or \"1.5 s\"".into(),
-            Self::Flag | Self::State => "`true` or `false`".into(),
+            Self::Value => "a value of the signal, such as `true`, 12.5, \"1.5 s\" or \"Auto\"".into(),
+            Self::Flag => "`true` or `false`".into(),
             Self::Register => "a register in quotes, such as \"holding:4\"".into(),
         }
     }

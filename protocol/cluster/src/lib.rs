@@ -31,7 +31,6 @@ mod source_text;
 mod taken_over;
 mod template;
 mod undriven;
-mod value;
 
 pub use address::{
     Addresses, MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,

@@ -109,7 +109,6 @@ fn property(key: &Key) -> Value {
         }
         Kind::Value => json!({ "type": ["boolean", "number", "string"] }),
         Kind::Flag => json!({ "type": "boolean", "default": false }),
-        Kind::State => json!({ "type": "boolean" }),
         Kind::Register => json!({ "type": "string", "pattern": "^(input|holding):[0-9]{1,5}$" }),
         Kind::Number { most, default } => {
             json!({ "type": "number", "minimum": -most, "maximum": most, "default": default })

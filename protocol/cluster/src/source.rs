@@ -1,6 +1,7 @@
 //! Inputs that do not come from the field.
 
 use understudy_remote_io::{OperatorInput, OperatorInputKind, SignalInput};
+use understudy_typed::Declared;
 
 /// Input of a program with a source of its own.
 #[derive(Debug, Clone)]
@@ -25,6 +26,8 @@ pub enum InputSourceKind {
 pub struct OperatorDeclaration {
     /// Place, behaviour and rights.
     pub input: OperatorInput,
+    /// How the program declares it.
+    pub declared: Declared,
     /// Text on the page; the name of the input where absent.
     pub title: Option<String>,
     /// Unit of a setpoint.

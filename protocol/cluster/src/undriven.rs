@@ -11,12 +11,15 @@ pub(crate) fn initial_image(points: &Points) -> Image {
 /// What inputs are while nothing drives them, as a part of a sentence.
 pub(crate) fn remains(inputs: &[&Point]) -> String {
     let values = inputs.iter().filter(|point| point.initial != 0);
-    let values: Vec<String> =
-        values.map(|point| format!("`{}` {}", point.name, point.of.text(point.initial))).collect();
+    let values: Vec<String> = values
+        .map(|point| format!("`{}` {}", point.name, point.declared().text(point.initial)))
+        .collect();
     match (inputs, values.as_slice()) {
         ([_], []) => "it stays 0".to_owned(),
         (_, []) => "they stay 0".to_owned(),
-        ([point], _) => format!("it keeps its initial value {}", point.of.text(point.initial)),
+        ([point], _) => {
+            format!("it keeps its initial value {}", point.declared().text(point.initial))
+        }
         _ if values.len() == inputs.len() => {
             format!("they keep their initial values {}", values.join(", "))
         }

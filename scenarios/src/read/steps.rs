@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_cluster::{stored_value, value_text};
-use understudy_journal::NamedSignal;
-use understudy_remote_io::{OperatorInput, OperatorInputKind, ValueMismatch};
+use understudy_journal::{NamedInput, NamedSignal};
+use understudy_remote_io::{OperatorInputKind, ValueMismatch};
 use understudy_simulator::{Action, Fault};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
@@ -168,13 +168,14 @@ impl Reader<'_> {
                 let value = value.and_then(|value| value.constant(&mut self.diagnostics));
                 let Placed { value: signal, .. } = self.input(fields, member)?;
                 let Placed { value, span } = value?;
-                match stored_value(&value, signal.of) {
+                match stored_value(&value, &signal.declared) {
                     Ok(stored) => one(Action::Set {
                         input: signal.place.first_bit(),
-                        value: PointValue::new(signal.of.bits(), stored),
+                        value: PointValue::new(signal.declared.of.bits(), stored),
                     }),
                     Err(problem) => {
-                        let message = format!("`{}` is {}: {problem}", signal.name, signal.of);
+                        let message =
+                            format!("`{}` is {}: {problem}", signal.name, signal.declared);
                         let error = Diagnostic::error("U0304", message, span);
                         self.diagnostics.push(error);
                         None
@@ -242,11 +243,11 @@ impl Reader<'_> {
     /// The input of a module that is stuck: one bit.
     fn module_input(&mut self, fields: &mut Fields<'_, '_>, member: Option<Member>) -> Option<u16> {
         let Placed { value: signal, span } = self.input(fields, member)?;
-        let (place, of, name) = (signal.place.first_bit(), signal.of, signal.name.clone());
+        let (place, of) = (signal.place.first_bit(), signal.declared.of);
         if of.bits() == 1 {
             return Some(place);
         }
-        let message = format!("`{name}` is {of}: an input module is stuck at a BOOL only");
+        let message = format!("`{}` is {of}: an input module is stuck at a BOOL only", signal.name);
         self.diagnostics.push(Diagnostic::error("U0304", message, span));
         None
     }
@@ -270,7 +271,7 @@ impl Reader<'_> {
             return None;
         };
         let place = named.input.place;
-        let problem = match stored_value(&value.value, place.of) {
+        let problem = match stored_value(&value.value, &named.declared) {
             Ok(stored) => {
                 let value = PointValue::new(place.of.bits(), stored);
                 match named.input.check(value) {
@@ -278,13 +279,13 @@ impl Reader<'_> {
                         let input = place.bit;
                         return Some(Action::Write { input, value });
                     }
-                    Err(ValueMismatch::Limits) => outside(&named.input),
+                    Err(ValueMismatch::Limits) => outside(named),
                     Err(ValueMismatch::Type) => "the value has another type".to_owned(),
                 }
             }
             Err(expected) => expected,
         };
-        let message = format!("`{}` is {}: {problem}", named.name, place.of);
+        let message = format!("`{}` is {}: {problem}", named.name, named.declared);
         self.diagnostics.push(Diagnostic::error("U0304", message, value.span));
         None
     }
@@ -451,9 +452,9 @@ impl Reader<'_> {
 }
 
 /// What is wrong with a value outside the limits of an operator input.
-fn outside(input: &OperatorInput) -> String {
-    let text = |stored| value_text(input.place.of, stored);
-    match input.kind {
+fn outside(named: &NamedInput) -> String {
+    let text = |stored| value_text(&named.declared, stored);
+    match named.input.kind {
         OperatorInputKind::Setpoint { low, high } => format!(
             "the value is outside the limits: write one from {} to {}",
             text(low),

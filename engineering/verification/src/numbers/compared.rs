@@ -6,7 +6,7 @@ use understudy_bits::{System, Term};
 use understudy_executable::typed_value;
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
-use understudy_typed::Elementary;
+use understudy_typed::{Declared, Elementary};
 
 use crate::assumed::SO_FAR;
 use crate::property::{Compared, Formula, Named, Property};
@@ -76,8 +76,8 @@ fn add_one(
         system.compare(text, left, *comparison, right);
         return Ok(());
     }
-    let values = system.values.get(&named.name).map_or(&[][..], Vec::as_slice);
-    let stored = value(of, values, with).map_err(|help| {
+    let known = system.enumerated.get(&named.name).cloned();
+    let stored = value(&known.unwrap_or(of.into()), with).map_err(|help| {
         (format!("`{with}` is neither a value of `{}` : {of} nor a number", named.name), help)
     })?;
     system.compare_with_value(text, left, *comparison, stored);
@@ -101,18 +101,10 @@ fn number(system: &System, name: &str) -> Result<Term, (String, String)> {
 }
 
 /// The stored value of what is written, or what is written instead.
-fn value(of: Elementary, values: &[(String, i64)], text: &str) -> Result<u64, String> {
-    let name = text.rsplit('#').next().unwrap_or(text);
-    if let Some((_, value)) = values.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
-        return Ok(*value as u64 & of.mask());
-    }
-    typed_value(text, of).map_err(|help| match values.is_empty() {
-        true if of == Elementary::Time => "write a duration, such as 1.5s".to_owned(),
-        true => help,
-        false => {
-            let names: Vec<&str> = values.iter().take(8).map(|(name, _)| name.as_str()).collect();
-            format!("its values are {}", names.join(", "))
-        }
+fn value(declared: &Declared, text: &str) -> Result<u64, String> {
+    typed_value(text, declared).map_err(|help| match declared.of {
+        Elementary::Time => "write a duration, such as 1.5s".to_owned(),
+        _ => help,
     })
 }
 

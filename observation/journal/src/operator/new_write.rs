@@ -3,10 +3,10 @@
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
 
-use understudy_cluster::{Cluster, InputSource, typed_value, value_text};
-use understudy_remote_io::{OperatorInput, OperatorInputKind, ValueMismatch};
+use understudy_cluster::{Cluster, InputSource, OperatorDeclaration, typed_value, value_text};
+use understudy_remote_io::{OperatorInputKind, ValueMismatch};
 use understudy_text::spelling::suggestion;
-use understudy_typed::Elementary;
+use understudy_typed::Declared;
 use understudy_wire::{ForceError, Member, PointValue, Role, Write, WriteId, WriteRefusal};
 
 /// A write as a person or a program asks for it.
@@ -107,20 +107,20 @@ pub fn new_write(
         Member::Station(_) | Member::Plant(_) => None,
     };
     let sources = remote_io.map_or(&[][..], |remote_io| &remote_io.inputs);
-    let operator = |source: &InputSource| Some(source.operator()?.input);
     let found = sources.iter().find(|source| source.name == input);
-    let Some(declared) = found.and_then(operator) else {
-        let names = sources.iter().filter(|source| operator(source).is_some());
+    let Some(operator) = found.and_then(InputSource::operator) else {
+        let names = sources.iter().filter(|source| source.operator().is_some());
         return Err(WriteProblem::NoInput {
             member: cluster.member_name(member).unwrap_or_default().to_owned(),
             input: input.chars().take(60).collect(),
             help: suggestion(input, names.map(|source| source.name.as_str())),
         });
     };
-    let of = declared.place.of;
+    let OperatorDeclaration { input: place, declared, .. } = operator;
+    let of = declared.of;
     let text = match request.value {
         RequestedValue::Text(text) => text.trim().to_owned(),
-        RequestedValue::Stored(stored) => value_text(of, stored),
+        RequestedValue::Stored(stored) => value_text(declared, stored),
     };
     let invalid = |help: String| WriteProblem::Value {
         input: input.to_owned(),
@@ -128,21 +128,25 @@ pub fn new_write(
         help,
     };
     let stored = match request.value {
-        RequestedValue::Text(_) => typed_value(&text, of).map_err(invalid)?,
+        RequestedValue::Text(_) => typed_value(&text, declared).map_err(invalid)?,
+        // Of an enumeration a number without a name is no value.
+        RequestedValue::Stored(_) if declared.values.is_some() => {
+            typed_value(text.trim_matches('"'), declared).map_err(invalid)?
+        }
         RequestedValue::Stored(stored) => stored,
     };
     let value = PointValue::new(of.bits(), stored);
-    declared.check(value).map_err(|mismatch| match mismatch {
-        ValueMismatch::Type => invalid(format!("the input is {of}")),
+    place.check(value).map_err(|mismatch| match mismatch {
+        ValueMismatch::Type => invalid(format!("the input is {declared}")),
         ValueMismatch::Limits => WriteProblem::Limits {
             input: input.to_owned(),
             text: text.chars().take(60).collect(),
-            help: limits(&declared),
+            help: limits(operator),
         },
     })?;
     let write = Write {
         id: new_id(),
-        input: declared.place.bit,
+        input: place.place.bit,
         value,
         role: request.role,
         owner: request.owner.to_owned(),
@@ -156,16 +160,17 @@ pub fn new_write(
 ///
 /// # Errors
 /// What is written instead for a signal of that type.
-pub fn force_value(text: &str, of: Elementary) -> Result<PointValue, String> {
-    let stored = typed_value(text.trim(), of)
-        .map_err(|help| format!("invalid value `{text:.60}` of {} {of}: {help}", of.article()))?;
-    Ok(PointValue::new(of.bits(), stored))
+pub fn force_value(text: &str, declared: &Declared) -> Result<PointValue, String> {
+    let stored = typed_value(text.trim(), declared).map_err(|help| {
+        format!("invalid value `{text:.60}` of {} {declared}: {help}", declared.article())
+    })?;
+    Ok(PointValue::new(declared.of.bits(), stored))
 }
 
-fn limits(input: &OperatorInput) -> String {
-    match input.kind {
+fn limits(operator: &OperatorDeclaration) -> String {
+    match operator.input.kind {
         OperatorInputKind::Setpoint { low, high } => {
-            let text = |stored| value_text(input.place.of, stored);
+            let text = |stored| value_text(&operator.declared, stored);
             format!("from {} to {}", text(low), text(high))
         }
         _ => String::new(),

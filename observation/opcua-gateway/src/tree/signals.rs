@@ -11,6 +11,9 @@ use understudy_wire::{Member, ProgramId};
 use super::{Kind, Tree, WritableInput};
 use crate::trust;
 
+/// Numbers from 0 whose names a client is given.
+const MOST_NAMES: usize = 256;
+
 /// Bits that a number of OPC UA holds.
 const WORD_BITS: usize = 64;
 
@@ -36,8 +39,9 @@ impl Tree {
                 let trust = program.map(|it| trust::input(it, &own.name, failed == Some(1)));
                 seen.present(variant_of(&own, image), trust.unwrap_or_default())
             });
-            if let (Some(added), Some((_, writable))) = (self.variables.last_mut(), writable) {
-                added.writable = Some(writable);
+            if let Some(added) = self.variables.last_mut() {
+                added.names = value_names(point);
+                added.writable = writable.map(|(_, writable)| writable);
             }
         }
         self.enter(&["Programs", &controller.name, "Outputs"]);
@@ -53,6 +57,9 @@ impl Tree {
                 let trust = program.map(|program| trust::output(program, &own.name));
                 seen.present(variant_of(&own, image), trust.unwrap_or_default())
             });
+            if let Some(added) = self.variables.last_mut() {
+                added.names = value_names(point);
+            }
         }
         self.enter(&["Programs", &controller.name, "Markers"]);
         let registers = controller.circuit().map_or(&[][..], Circuit::registers);
@@ -68,6 +75,22 @@ impl Tree {
             });
         }
     }
+}
+
+/// The names of the values of an enumeration, by number from 0; none where a value is below 0 or far above.
+fn value_names(point: &Point) -> Vec<String> {
+    let known = point.values.iter().flat_map(|known| &known.values);
+    let mut names = Vec::new();
+    for (name, value) in known {
+        let Some(place) = usize::try_from(*value).ok().filter(|place| *place < MOST_NAMES) else {
+            return Vec::new();
+        };
+        names.resize(names.len().max(place + 1), String::new());
+        if names[place].is_empty() {
+            names[place].clone_from(name);
+        }
+    }
+    names
 }
 
 /// Meaning of the variable of an input.

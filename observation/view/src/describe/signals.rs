@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 use understudy_journal::{Cycles, Happening, Members, NamedSignal, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_typed::Elementary;
+use understudy_typed::{Declared, Elementary};
 use understudy_wire::{Force, Image, Member, PointValue, SignalPlace, Write, WriteId};
 
 use crate::value::{is_declared, stored_text};
@@ -107,9 +107,9 @@ impl Names<'_> {
 fn image_text<'a>(image: &Image, signals: impl Iterator<Item = &'a NamedSignal>) -> String {
     let signals: Vec<&NamedSignal> = signals.collect();
     let end = |signal: &&NamedSignal| {
-        u32::from(signal.place.first_bit()) + signal.of.bits() <= image.width() as u32
+        u32::from(signal.place.first_bit()) + signal.declared.of.bits() <= image.width() as u32
     };
-    let has_numbers = signals.iter().any(|signal| signal.of != Elementary::Bool);
+    let has_numbers = signals.iter().any(|signal| signal.declared.of != Elementary::Bool);
     if !has_numbers || !signals.iter().all(end) {
         return image.to_string();
     }
@@ -117,8 +117,8 @@ fn image_text<'a>(image: &Image, signals: impl Iterator<Item = &'a NamedSignal>)
     let texts = declared.map(|signal| {
         let bit = usize::from(signal.place.first_bit());
         // No point crosses a word.
-        let stored = image.words()[bit / 64] >> (bit % 64) & signal.of.mask();
-        let text = number_text(signal.of, stored, signal.unit.as_deref());
+        let stored = image.words()[bit / 64] >> (bit % 64) & signal.declared.of.mask();
+        let text = number_text(&signal.declared, stored, signal.unit.as_deref());
         format!("{} = {text}", signal.name)
     });
     texts.collect::<Vec<String>>().join(", ")
@@ -149,10 +149,10 @@ fn signal_value(
 ) -> String {
     let stored = value.stored();
     let known = signal(by, place, members);
-    let known = known.filter(|signal| signal.of.bits() == u32::from(value.width()));
+    let known = known.filter(|signal| signal.declared.of.bits() == u32::from(value.width()));
     match (known, value) {
         (_, PointValue::Bit(bit)) => u8::from(bit).to_string(),
-        (Some(signal), _) => number_text(signal.of, stored, signal.unit.as_deref()),
+        (Some(signal), _) => number_text(&signal.declared, stored, signal.unit.as_deref()),
         (None, PointValue::Number { width, .. }) => {
             let digits = usize::from(width) / 4;
             format!("16#{stored:0digits$X}")
@@ -184,8 +184,8 @@ pub(crate) fn modules_text(
     texts.collect::<Vec<_>>().join("; ")
 }
 
-fn number_text(of: Elementary, stored: u64, unit: Option<&str>) -> String {
-    let text = stored_text(of, stored);
+fn number_text(declared: &Declared, stored: u64, unit: Option<&str>) -> String {
+    let text = stored_text(declared, stored);
     match unit {
         Some(unit) => format!("{text} {unit}"),
         None => text,

@@ -17,7 +17,7 @@ use crate::error::ViewError;
 use crate::history::History;
 use crate::model::Model;
 use crate::source_text::SourceText;
-use crate::value::elementary;
+use crate::value::shown;
 
 /// Reasons within reasons.
 const DEEPEST: usize = 12;
@@ -152,7 +152,7 @@ impl<'m> Explainer<'m> {
         let mut reason = Reason {
             at: None,
             value,
-            of: self.program.part(name).and_then(|part| part.of.elementary()),
+            of: self.program.part(name).and_then(|part| part.declared()),
             ..self.leaf(name, None, at, text)
         };
         if let Some(routine) = fault.routine {
@@ -191,11 +191,17 @@ impl<'m> Explainer<'m> {
     }
 
     fn leaf(&self, signal: &str, stored: Stored, place: usize, text: impl Into<String>) -> Reason {
+        let declared = stored.map(|(of, _)| {
+            let part = self.program.part(signal);
+            let declared = part.and_then(|part| part.declared());
+            declared.filter(|declared| declared.of == of).unwrap_or(of.into())
+        });
+        let value = declared.as_ref().zip(stored);
         Reason {
             at: None,
             signal: signal.to_owned(),
-            value: stored.map_or(Value::Null, |(of, stored)| elementary(of, stored)),
-            of: stored.map(|(of, _)| of),
+            value: value.map_or(Value::Null, |(declared, (_, stored))| shown(declared, stored)),
+            of: declared,
             cycle: self.cycle(place),
             rung: None,
             title: None,

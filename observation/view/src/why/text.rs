@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use serde_json::Value;
-use understudy_typed::Elementary;
+use understudy_typed::Declared;
 
 use super::{Reason, Why, WhyForced};
 use crate::value::{stored_text, value_text};
@@ -13,7 +13,7 @@ impl Why {
     /// For a terminal, with times of day in a zone; lines end in a newline.
     pub fn to_text(&self, zone: Zone) -> String {
         let mut text = String::new();
-        let value = shown(&self.value, self.of);
+        let value = text_of(&self.value, self.of.as_ref());
         let at = self.at.map_or_else(String::new, |at| format!(", {}", zone.whole(at)));
         let _ = writeln!(
             text,
@@ -29,7 +29,7 @@ impl Why {
         }
         self.write_driving(&mut text);
         if let Some(scanned) = &self.scanned {
-            let scanned = shown(scanned, self.of);
+            let scanned = text_of(scanned, self.of.as_ref());
             let _ = writeln!(text, "  the scan of this cycle yields {scanned}");
         }
         if let Some(inputs) = self.inputs_text.as_ref().filter(|it| !it.is_empty()) {
@@ -67,7 +67,7 @@ impl Why {
         // Of a forced output the value without the force.
         let it = if self.forced.is_some() { "that" } else { "it" };
         if let Some(configured) = &self.ramp_to {
-            let configured = shown(configured, self.of);
+            let configured = text_of(configured, self.of.as_ref());
             let _ = writeln!(text, "  {it} is on its ramp to the fail-safe value {configured}");
         } else if self.source == Some(FAIL_SAFE) {
             let _ = writeln!(text, "  {it} is the configured fail-safe value");
@@ -104,7 +104,7 @@ impl Why {
         let unforced = self.forced.as_ref().and_then(|force| force.unforced.as_ref());
         let _ = match unforced {
             Some(value) => {
-                let value = shown(value, self.of);
+                let value = text_of(value, self.of.as_ref());
                 writeln!(
                     text,
                     "  {} drives it; without the force it would be {value}, {source}{why}",
@@ -120,9 +120,11 @@ impl Why {
 const FAIL_SAFE: &str = "fail-safe";
 
 /// A value as people read it: a time with its unit.
-fn shown(value: &Value, of: Option<Elementary>) -> String {
-    match (of, value.as_i64()) {
-        (Some(of), Some(stored)) if of.is_time() => stored_text(of, stored as u64),
+fn text_of(value: &Value, declared: Option<&Declared>) -> String {
+    match (declared, value.as_i64()) {
+        (Some(declared), Some(stored)) if declared.of.is_time() => {
+            stored_text(declared, stored as u64)
+        }
         _ => value_text(value),
     }
 }
@@ -138,7 +140,7 @@ fn children(text: &mut String, reason: &Reason, indent: &str, zone: Zone) {
 }
 
 fn line(text: &mut String, reason: &Reason, parent: i64, zone: Zone) {
-    let value = shown(&reason.value, reason.of);
+    let value = text_of(&reason.value, reason.of.as_ref());
     let at = reason.at.map_or_else(String::new, |at| format!(", {}", zone.clock(at)));
     let when = if reason.cycle == parent {
         String::new()

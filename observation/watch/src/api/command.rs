@@ -83,7 +83,7 @@ impl AskedValue {
             let name = cluster.member_name(member).unwrap_or_default();
             Problem::invalid(code, format!("`{name}` has no such signal"))
         })?;
-        force_value(&text, point.of).map_err(|message| Problem::invalid(code, message))
+        force_value(&text, &point.declared()).map_err(|message| Problem::invalid(code, message))
     }
 }
 

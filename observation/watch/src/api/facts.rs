@@ -14,11 +14,12 @@ use serde_json::Value;
 use understudy_cluster::{Controller, OperatorDeclaration};
 use understudy_remote_io::{OperatorInput, OperatorInputKind};
 use understudy_typed::Points;
-use understudy_view::elementary;
+use understudy_view::shown as shown_value;
 use understudy_wire::{Member, ProgramId, Role};
 
 use super::Answered;
 use super::compare::others;
+use super::signals::value_names;
 use crate::app::App;
 use crate::error::Problem;
 use crate::login::Person;
@@ -65,7 +66,10 @@ struct SignalFacts {
     name: String,
     /// Its type, `BOOL`.
     #[serde(rename = "type")]
-    of: &'static str,
+    of: String,
+    /// The names of the values of an enumeration, by number.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    values: BTreeMap<i64, String>,
     /// Its first bit in the image.
     bit: u32,
     address: Option<String>,
@@ -85,7 +89,7 @@ struct OperatorFacts {
     unit: Option<String>,
     /// Whether the page asks before it writes.
     confirm: bool,
-    /// Of a setpoint: a time in nanoseconds.
+    /// Of a setpoint: a duration in nanoseconds, a value of an enumeration by its name.
     low: Option<Value>,
     high: Option<Value>,
     /// Reason why this person may not write it.
@@ -180,7 +184,7 @@ fn program_facts(known: &Known, program: ProgramId, role: Role) -> ProgramFacts 
 
 /// Nothing for an input that the gateway of another group writes.
 fn operator_facts(name: &str, declared: &OperatorDeclaration, role: Role) -> Option<OperatorFacts> {
-    let OperatorInput { place, kind, role: required, .. } = declared.input;
+    let OperatorInput { kind, role: required, .. } = declared.input;
     let (kind, limits) = match kind {
         OperatorInputKind::Level => ("level", None),
         OperatorInputKind::Pulse(_) => ("pulse", None),
@@ -192,8 +196,8 @@ fn operator_facts(name: &str, declared: &OperatorDeclaration, role: Role) -> Opt
         title: declared.title.clone().unwrap_or_else(|| name.to_owned()),
         unit: declared.unit.clone(),
         confirm: declared.confirm,
-        low: limits.map(|(low, _)| elementary(place.of, low)),
-        high: limits.map(|(_, high)| elementary(place.of, high)),
+        low: limits.map(|(low, _)| shown_value(&declared.declared, low)),
+        high: limits.map(|(_, high)| shown_value(&declared.declared, high)),
         why: (role < required).then(|| format!("it requires the role {}", required.word())),
     })
 }
@@ -216,7 +220,8 @@ fn signal_facts(controller: &Controller, points: &Points) -> Vec<SignalFacts> {
         let (address, comment) = known.unwrap_or_default();
         SignalFacts {
             name: point.name.clone(),
-            of: point.of.name(),
+            of: point.declared().to_string(),
+            values: value_names(point.values.as_deref()),
             bit: point.bit,
             address,
             comment,
@@ -313,6 +318,7 @@ mod tests {
                 role: Role::Engineer,
                 retains: false,
             },
+            declared: Elementary::Int.into(),
             title: None,
             unit: Some("mm".to_owned()),
             confirm: true,

@@ -11,8 +11,8 @@ use axum::extract::rejection::QueryRejection;
 use axum::extract::{Query, State};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use understudy_typed::{Point, Points};
-use understudy_view::{StateSignal, elementary};
+use understudy_typed::{Enumeration, Point, Points};
+use understudy_view::{StateSignal, shown};
 use understudy_wire::ProgramId;
 
 use super::Answered;
@@ -87,9 +87,18 @@ pub(super) struct Listed {
     kind: &'static str,
     name: String,
     #[serde(rename = "type")]
-    of: &'static str,
+    of: String,
+    /// The names of the values of an enumeration, by number.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    values: BTreeMap<i64, String>,
     address: Option<String>,
     comment: Option<String>,
+}
+
+/// The names of the values of an enumeration, by number; of several names the first.
+pub(super) fn value_names(known: Option<&Enumeration>) -> BTreeMap<i64, String> {
+    let values = known.into_iter().flat_map(|known| known.values.iter().rev());
+    values.map(|(name, value)| (*value, name.clone())).collect()
 }
 
 /// The signals in the states of all programs; inputs and outputs are facts of the run.
@@ -103,6 +112,7 @@ pub(super) async fn signals(State(app): State<Arc<App>>) -> Answered<Json<Vec<Li
             id: format!("{}.state.{}", program.0, identified(&signal.name)),
             program: program.index(),
             kind: signal.kind.word(),
+            values: value_names(signal.values()),
             name: signal.name,
             of: signal.of,
             address: signal.address,
@@ -151,13 +161,14 @@ pub(super) async fn values(
                 }
             };
             if let Some(image) = image.and_then(|images| images.at(cycle)) {
-                values[place] = elementary(point.of, point.get(image.words()));
+                values[place] = shown(&point.declared(), point.get(image.words()));
             }
         }
         for (program, (places, own)) in of_states {
             let found = known.run.state_values(ProgramId(program), cycle, &own);
-            for (place, value) in places.into_iter().zip(found.unwrap_or_default()) {
-                values[place] = value;
+            let found = found.unwrap_or_default().into_iter().zip(&own);
+            for (place, (value, signal)) in places.into_iter().zip(found) {
+                values[place] = signal.shown(value);
             }
         }
         Ok(Values { cycle, values })

@@ -147,7 +147,7 @@ impl Execution<'_> {
         for (_, to) in &call.outputs {
             taken.push(self.address(context, to)?);
         }
-        let line = self.line;
+        let statement = self.terms.statement;
         self.clear_frame(call.routine);
         for (argument, value) in call.arguments.iter().zip(given) {
             match (argument, value) {
@@ -163,7 +163,7 @@ impl Execution<'_> {
             }
         }
         self.body(inner)?;
-        self.line = line;
+        self.terms.statement = statement;
         for ((from, to), address) in call.outputs.iter().zip(taken) {
             let source = self.address(inner, from)?;
             match self.load(source, &from.of) {

@@ -73,9 +73,9 @@ impl Execution<'_> {
         each: &Loop<'_>,
         unknown: u32,
     ) -> Result<Term> {
-        let line = self.line;
+        let statement = self.terms.statement;
         loop {
-            self.line = line;
+            self.terms.statement = statement;
             let begins = self.begins(context, each)?;
             if self.terms.is(begins, false) {
                 return Ok(begins);

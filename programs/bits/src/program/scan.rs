@@ -8,7 +8,7 @@ use crate::execute::timers::Timers;
 use crate::execute::{Cells, Execution, Unsupported};
 use crate::program::moments::Age;
 use crate::system::Holds;
-use crate::term::{Node, Term, Terms, Variable};
+use crate::term::{Made, Node, Term, Terms, Variable};
 use crate::{Input, System};
 
 /// Cells of one program, made when they are read first.
@@ -136,12 +136,15 @@ impl System {
                 cells.number(&mut self.terms, part.address, of);
             }
         }
-        let mut execution = Execution::new(program, &mut self.terms, &mut cells, elapsed, timers);
+        let before = self.routines.len();
+        self.routines.extend(program.routines.iter().map(|routine| routine.name.clone()));
+        let mut execution =
+            Execution::new(program, &mut self.terms, &mut cells, elapsed, timers, before);
         for (point, &input) in program.inputs.iter().zip(inputs) {
             if point.slot != 0 {
                 execution.put(point.slot, input);
                 if !within_subrange(execution.terms, &self.inputs, point, input) {
-                    execution.limit(point.slot, point.declared());
+                    execution.limit(point.slot, &point.declared());
                 }
             }
         }
@@ -157,9 +160,10 @@ impl System {
             };
             execution.task(task.routine, task.own, runs)?;
         }
+        execution.terms.statement = Made::default();
         for point in &program.outputs {
             execution.finite(point.slot, point.of);
-            execution.limit(point.slot, point.declared());
+            execution.limit(point.slot, &point.declared());
         }
         let faulted = execution.faulted;
         let memory = execution.written();

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use understudy_typed::{Declared, Elementary, Root, Type};
+use understudy_typed::{Declared, Elementary, Root, Type, indices};
 
 use crate::syntax::{Class, Declaration, Name, Retention, Span};
 
@@ -178,10 +178,7 @@ impl Lowering<'_> {
         slot: u32,
         is_input: bool,
     ) {
-        let known = match is_input {
-            true => &mut self.program.inputs,
-            false => &mut self.program.outputs,
-        };
+        let known = self.points_mut(is_input);
         if known.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
             shown = format!("{shown} {address}");
         }
@@ -200,8 +197,8 @@ impl Lowering<'_> {
         if points.len() >= MAXIMUM_POINTS {
             return false;
         }
-        if let Some(of) = of.elementary() {
-            points.push((name.to_owned(), Declared { of, range }, slot));
+        if let Some(declared) = self.program.declared(of) {
+            points.push((name.to_owned(), Declared { range, ..declared }, slot));
             return true;
         }
         match of {
@@ -217,17 +214,16 @@ impl Lowering<'_> {
                     })
             }
             // Elements that share a slot have no point of their own.
-            Type::Array(array) => match array.ranges.as_slice() {
-                [(low, high)] if array.stride().is_multiple_of(64) => {
-                    let slots = (array.stride() / 64) as u32;
-                    (*low..=*high).zip(0..).all(|(at, place)| {
-                        let name = format!("{name}[{at}]");
+            Type::Array(array) => {
+                let slots = (array.stride() / 64) as u32;
+                array.stride().is_multiple_of(64)
+                    && (0..array.length()).all(|at| {
+                        let Some(indices) = indices(array, at) else { return false };
                         let of = (&array.element, range);
-                        self.points_of(of, &name, slot + place * slots, points)
+                        let slot = slot + at as u32 * slots;
+                        self.points_of(of, &format!("{name}{indices}"), slot, points)
                     })
-                }
-                _ => false,
-            },
+            }
             _ => false,
         }
     }

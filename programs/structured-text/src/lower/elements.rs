@@ -1,13 +1,14 @@
-//! Arrays at `%I` and `%Q`: each element is a point.
+//! Arrays of inputs and outputs: each element is a point.
 //!
 //! Elements share slots of the state, and a point has one of its own. So inputs are copied into the array before the programs run, and
 //! outputs from it behind them.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use understudy_typed::{
-    Declared, Elementary, Place, Root, Routine, RoutineId, RoutineKind, Statement, StatementKind,
-    Task, Type,
+    Array, Declared, Elementary, Initial, Place, Root, Routine, RoutineId, RoutineKind, Statement,
+    StatementKind, Task, Type, indices,
 };
 
 use crate::syntax::{Name, Span};
@@ -19,8 +20,8 @@ use super::names::Symbol;
 use super::places::{load, place};
 use super::types::Resolved;
 
-/// Elements that an array at an address may have.
-const MAXIMUM_ELEMENTS: u64 = 1_000;
+/// Elements that an array of points may have.
+pub(super) const MAXIMUM_ELEMENTS: u64 = 1_000;
 
 /// What is known of the elements of all arrays at addresses.
 #[derive(Default)]
@@ -47,7 +48,8 @@ impl Lowering<'_> {
         let Type::Array(array) = &resolved.of else {
             return None;
         };
-        let low = array.ranges.first().map_or(0, |range| range.0);
+        let declared = self.program.declared(&array.element)?;
+        let declared = Declared { range: resolved.range, ..declared };
         if array.length() > MAXIMUM_ELEMENTS {
             let message = format!(
                 "`{name}` at {address} has {} elements; at most {MAXIMUM_ELEMENTS} are points",
@@ -66,32 +68,55 @@ impl Lowering<'_> {
         }
         let slot = self.state(resolved.of.slots(), &name.span())?;
         self.program.initial.extend(initial(&resolved.image, slot));
-        let line = self.line(&name.span());
         for at in 0..array.length() {
-            let shown = format!("{name}[{}]", low.saturating_add_unsigned(at));
+            let shown = format!("{name}{}", indices(array, at)?);
             for key in keys(&key, at) {
                 self.is_free(&shown, name, address, &key)?;
                 self.elements.known.insert(key, (shown.clone(), name.span()));
             }
-            let own = self.state(1, &name.span())?;
-            self.point_at(shown, address, Declared { of, range: resolved.range }, own, is_input);
+        }
+        let root = (array.as_ref(), &declared, slot);
+        for (shown, own) in self.elements_of(name.as_str(), root, &name.span(), is_input)? {
+            self.point_at(shown, address, declared.clone(), own, is_input);
+        }
+        self.overlap(name, address, resolved)?;
+        Some(at_slot(name, slot, resolved, is_input))
+    }
+
+    /// A slot for the point of each element of an array at a slot of the state, with its name, and the copies between them. The slots begin as the
+    /// elements do.
+    pub(super) fn elements_of(
+        &mut self,
+        name: &str,
+        (array, declared, slot): (&Array, &Declared, u32),
+        span: &Span,
+        is_input: bool,
+    ) -> Option<Vec<(String, u32)>> {
+        let (line, of, range) = (self.line(span), declared.of, declared.range);
+        let behind = slot + Type::Array(Arc::new(array.clone())).slots() as u32;
+        let begins = self.program.initial.iter().filter(|it| (slot..behind).contains(&it.slot));
+        let begins: HashMap<u32, u64> = begins.map(|it| (it.slot, it.value)).collect();
+        let mut points = Vec::new();
+        for at in 0..array.length() {
+            let own = self.state(1, span)?;
             let bit = at * array.stride();
-            let within = Place {
-                offset: (bit / 64) as u32,
-                bit: (bit % 64) as u32,
-                is_packed: true,
-                range: resolved.range,
-                ..place(Root::Global(slot), Type::Elementary(of))
-            };
+            let (offset, bit) = ((bit / 64) as u32, (bit % 64) as u32);
+            let word = begins.get(&(slot + offset)).copied().unwrap_or(0);
+            let value = word >> bit & of.mask();
+            if value != 0 {
+                self.program.initial.push(Initial { slot: own, value });
+            }
+            let root = place(Root::Global(slot), Type::Elementary(of));
+            let within = Place { offset, bit, is_packed: true, range, ..root };
             let point = place(Root::Global(own), Type::Elementary(of));
             let (to, from, list) = match is_input {
                 true => (within, point, &mut self.elements.before),
                 false => (point, within, &mut self.elements.behind),
             };
             list.push(Statement { line, kind: StatementKind::Assign(to, load(from)) });
+            points.push((format!("{name}{}", indices(array, at)?), own));
         }
-        self.overlap(name, address, resolved)?;
-        Some(at_slot(name, slot, resolved, is_input))
+        Some(points)
     }
 
     /// Refuses an element at an address that is taken.

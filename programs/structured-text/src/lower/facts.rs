@@ -181,7 +181,7 @@ impl Lowering<'_> {
         if found.is_within(range) {
             return Some(());
         }
-        let declared = Declared { of, range: Some(range) };
+        let declared = Declared { range: Some(range), ..of.into() };
         let (low, high) = found.ends();
         if low == high {
             let message = format!("{low} is outside {declared}");

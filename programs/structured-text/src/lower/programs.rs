@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{EdgeMemory, Elementary, Program, Root, Task, Type, Variable as Shown};
+use understudy_typed::{
+    Declared, EdgeMemory, Elementary, Points, Program, Root, Task, Type, Variable as Shown,
+};
 
 use crate::syntax::{
     Argument, Class, Declaration, Expression, File, Name, Retention, Span, Unit, UnitKind,
@@ -12,6 +14,7 @@ use crate::syntax::{
 
 use super::blocks::{Block, Key, Parameter};
 use super::called::roots;
+use super::elements::MAXIMUM_ELEMENTS;
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
 use super::tasks::{interval, shortest, task};
@@ -356,6 +359,19 @@ impl<'a> Lowering<'a> {
     }
 
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
+        if let Type::Array(array) = &variable.of
+            && array.stride() < 64
+            && array.length() <= MAXIMUM_ELEMENTS
+            && let Some(declared) = self.program.declared(&array.element)
+        {
+            let declared = Declared { range: variable.range, ..declared };
+            let root = (array.as_ref(), &declared, slot);
+            let points = self.elements_of(name, root, &variable.span, is_input);
+            for (name, own) in points.unwrap_or_default() {
+                self.points_mut(is_input).push_declared(name, declared.clone(), own);
+            }
+            return;
+        }
         let mut points = Vec::new();
         let root = (&variable.of, variable.range);
         if !self.points_of(root, name, slot, &mut points) {
@@ -372,12 +388,15 @@ impl<'a> Lowering<'a> {
             self.warn("U1055", message, variable.span.clone(), help);
             return;
         }
-        let known = match is_input {
+        for (name, declared, slot) in points {
+            self.points_mut(is_input).push_declared(name, declared, slot);
+        }
+    }
+
+    pub(super) fn points_mut(&mut self, are_inputs: bool) -> &mut Points {
+        match are_inputs {
             true => &mut self.program.inputs,
             false => &mut self.program.outputs,
-        };
-        for (name, declared, slot) in points {
-            known.push_declared(name, declared, slot);
         }
     }
 

@@ -392,7 +392,9 @@ impl<'a> Lowering<'a> {
         };
         let id = EnumerationId(self.program.enumerations.len() as u32);
         // Known at once, so that values may name each other.
-        self.program.enumerations.push(Enumeration { name: name.to_owned(), values: Vec::new() });
+        self.program
+            .enumerations
+            .push(Arc::new(Enumeration { name: name.to_owned(), values: Vec::new() }));
         let mut next: i128 = 0;
         let (least, most) = super::convert::limits(elementary);
         for (value_name, value) in values {
@@ -406,7 +408,7 @@ impl<'a> Lowering<'a> {
                 return None;
             };
             let enumeration = &mut self.program.enumerations[id.0 as usize];
-            enumeration.values.push((value_name.as_str().to_owned(), value));
+            Arc::make_mut(enumeration).values.push((value_name.as_str().to_owned(), value));
             let known = self.enumerators.entry(value_name.key()).or_default();
             known.push((id, elementary, value));
             next += 1;

@@ -134,10 +134,10 @@ pub(crate) fn program(seed: u64, statements: usize) -> Program {
 
 impl Generator {
     fn declare_types(&mut self) {
-        self.program.enumerations.push(Enumeration {
+        self.program.enumerations.push(Arc::new(Enumeration {
             name: "Mode".to_owned(),
             values: vec![("off".to_owned(), 0), ("on".to_owned(), 1)],
-        });
+        }));
         self.types = Elementary::ALL.map(Type::Elementary).to_vec();
         self.types.push(Type::Enumeration(EnumerationId(0), Elementary::Int));
         self.types.push(Type::Text(5));
@@ -193,13 +193,21 @@ impl Generator {
             let of = self.random.elementary();
             let slot = self.global(format!("u{index}"), Type::Elementary(of));
             let range = self.subrange(of);
-            self.program.inputs.push_declared(format!("u{index}"), Declared { of, range }, slot);
+            self.program.inputs.push_declared(
+                format!("u{index}"),
+                Declared { range, ..of.into() },
+                slot,
+            );
         }
         for index in 0..6 {
             let of = self.random.elementary();
             let slot = self.global(format!("y{index}"), Type::Elementary(of));
             let range = self.subrange(of);
-            self.program.outputs.push_declared(format!("y{index}"), Declared { of, range }, slot);
+            self.program.outputs.push_declared(
+                format!("y{index}"),
+                Declared { range, ..of.into() },
+                slot,
+            );
         }
         for index in 0..8 {
             let of = self.random.pick(&self.types).clone();

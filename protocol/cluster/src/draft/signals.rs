@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use understudy_executable::declared;
 use understudy_interchange::Source;
-use understudy_typed::{Declared, Elementary, Point, Points, Program, Type, Variable};
+use understudy_typed::{Declared, Elementary, Point, Points, Variable};
 
 use super::comment;
 
@@ -36,7 +36,7 @@ impl Signals {
                 let of_all = |points: &Points| {
                     let signal = |point: &Point| {
                         let variable = variables.get(point.name.as_str()).copied();
-                        Signal::point(&point.name, point.declared(), (variable, program))
+                        Signal::point(&point.name, point.declared(), variable)
                     };
                     declared(points).map(signal).collect()
                 };
@@ -53,33 +53,26 @@ impl Signals {
 }
 
 impl Signal {
-    fn point(
-        name: &str,
-        declared: Declared,
-        (variable, program): (Option<&Variable>, &Program),
-    ) -> Self {
-        let enumeration = variable.and_then(|variable| match variable.of {
-            Type::Enumeration(id, _) => program.enumerations.get(id.0 as usize),
-            _ => None,
-        });
+    fn point(name: &str, declared: Declared, variable: Option<&Variable>) -> Self {
         let values = || {
-            let values = enumeration?.values.iter().map(|(_, value)| i128::from(*value));
+            let known = declared.values.as_ref()?.values.iter();
+            let values = known.map(|(_, value)| i128::from(*value));
             Some((values.clone().min()?, values.max()?))
         };
+        let limits = declared.range.or_else(values).unwrap_or_else(|| declared.of.limits());
         let (address, description) = variable.map_or((None, None), |variable| {
             (variable.address.as_deref(), variable.description.as_deref())
         });
-        Self {
-            name: name.to_owned(),
-            declared,
-            limits: declared.range.or_else(values).unwrap_or_else(|| declared.of.limits()),
-            note: note(address, description),
-        }
+        Self { name: name.to_owned(), declared, limits, note: note(address, description) }
     }
 
     /// The value that is nearest to a whole number.
     pub(super) fn nearest(&self, wanted: i128) -> i128 {
-        wanted.clamp(self.limits.0, self.limits.1)
+        let (least, most) = self.limits;
+        let nearest = wanted.clamp(least, most);
+        let values = self.declared.values.iter().flat_map(|known| &known.values);
+        let values = values.map(|(_, value)| i128::from(*value));
+        values.min_by_key(|value| value.abs_diff(wanted)).unwrap_or(nearest)
     }
 
     pub(super) fn is_bit(&self) -> bool {

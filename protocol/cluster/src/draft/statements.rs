@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use understudy_text::duration;
-use understudy_typed::Elementary;
+use understudy_typed::{Declared, Elementary};
 
 use super::signals::Signal;
 use super::stub::{Named, Round, Stub};
@@ -60,7 +60,8 @@ PROGRAM {}
 
 fn line((terminal, signal): &Named<'_>) -> String {
     let note = signal.note.as_ref().map(|note| format!("  // {note}"));
-    format!("{terminal} : {};{}", signal.declared, note.unwrap_or_default())
+    let declared = Declared { values: None, ..signal.declared.clone() };
+    format!("{terminal} : {declared};{}", note.unwrap_or_default())
 }
 
 fn declare(text: &mut String, block: &str, lines: &mut dyn Iterator<Item = String>) {

@@ -144,17 +144,16 @@ fn condition(
 ) -> Option<AlarmCondition> {
     let of = point.of;
     // A subrange bounds no calculation, so a limit may lie outside.
-    let declared = Declared { of, range: None };
+    let declared = &Declared { range: None, ..point.declared() };
     let (limit, is_above) = match (&section.when, &section.above, &section.below) {
         (Some(when), None, None) => {
-            if of != Elementary::Bool {
+            if of != Elementary::Bool && point.values.is_none() {
                 let message = format!("`when` for the signal `{}`, which is {of}", point.name);
                 let help = "a number or a TIME has a limit: `above` or `below`";
                 diagnostics.push(misfit(message, when.span.clone(), help));
                 return None;
             }
-            return value("when", when, declared, diagnostics)
-                .map(|value| AlarmCondition::Is(value != 0));
+            return value("when", when, declared, diagnostics).map(AlarmCondition::Is);
         }
         (None, Some(above), None) => (above, true),
         (None, None, Some(below)) => (below, false),
@@ -180,7 +179,7 @@ fn condition(
                 );
                 return None;
             }
-            let distance = value("hysteresis", hysteresis, declared, diagnostics)?;
+            let distance = value("hysteresis", hysteresis, &of.into(), diagnostics)?;
             let over = moved(of, limit?, distance, is_above);
             let Some(over) = over else {
                 let message = format!("the limit and the hysteresis leave the range of {of}");

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use understudy_executable::Interface;
+use understudy_executable::{Interface, stored_value};
 use understudy_remote_io::{PointPlace, Ramp};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
@@ -12,7 +12,6 @@ use understudy_wire::Image;
 
 use super::Member;
 use crate::fields::{MAXIMUM_MISFITS, Placed};
-use crate::value::value_within;
 
 /// y(i) from the names that are set.
 pub(super) fn values(
@@ -26,7 +25,7 @@ pub(super) fn values(
     let width = interface.outputs.width();
     let mut image = Image::zero(width.min(understudy_wire::MAXIMUM_IMAGE_BITS));
     for (output, name, value) in outputs(member, interface, entries, diagnostics) {
-        match value_within(value, output.declared()) {
+        match stored_value(value, &output.declared()) {
             Ok(stored) => output.set(image.words_mut(), stored),
             Err(expected) => {
                 let message = format!("`{}` is {}: {expected}", output.name, output.declared());

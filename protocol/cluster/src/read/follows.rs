@@ -66,7 +66,7 @@ fn followed(
     let actuators = draft.kind.iter().flat_map(|kind| kind.terminals().actuators);
     let own = actuators.into_iter().find(|own| own.name == terminal);
     // A terminal that the plant does not have is reported with the others.
-    if let Some(own) = own.filter(|own| !own.declared.takes(point.declared())) {
+    if let Some(own) = own.filter(|own| !own.declared.takes(&point.declared())) {
         let receiver = format!("`{terminal}` of the plant `{}`", draft.name);
         let sender = format!("the sensor `{signal}` of the plant `{plant}`");
         let receiver = (receiver, own.declared);

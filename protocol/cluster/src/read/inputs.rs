@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_executable::Interface;
+use understudy_executable::{Interface, stored_value};
 use understudy_remote_io::{OperatorInput, OperatorInputKind, PointPlace, SignalInput, in_order};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
@@ -19,7 +19,6 @@ use crate::format::OPERATOR_INPUTS;
 use crate::source::{
     GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
 };
-use crate::value::value_within;
 
 /// Suffixes of the input that says whether a signal is valid; names in Structured Text have no dot.
 const VALID: [&str; 2] = [".valid", "_valid"];
@@ -123,17 +122,24 @@ fn misfit(message: String, span: Range<usize>, help: &str) -> Diagnostic {
 pub(super) fn value(
     key: &str,
     value: &Placed<Constant>,
-    declared: Declared,
+    declared: &Declared,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<u64> {
-    match value_within(&value.value, declared) {
+    match stored_value(&value.value, declared) {
         Ok(stored) => Some(stored),
         Err(expected) => {
-            let message = format!("`{key}` of {} {declared}: {expected}", declared.of.article());
+            let message = format!("`{key}` of {} {declared}: {expected}", declared.article());
             diagnostics.push(Diagnostic::error("U0204", message, value.span.clone()));
             None
         }
     }
+}
+
+/// The least and the greatest value of an enumeration, as stored.
+fn ends(point: &Point) -> Option<(u64, u64)> {
+    let numbers = || point.values.iter().flat_map(|known| &known.values).map(|(_, value)| *value);
+    let stored = |number: i64| number as u64 & point.of.mask();
+    Some((stored(numbers().min()?), stored(numbers().max()?)))
 }
 
 fn operator(
@@ -166,9 +172,11 @@ fn operator(
         return None;
     }
     let mut optional = |key: &str, found: Option<&Placed<Constant>>| {
-        found.and_then(|found| value(key, found, point.declared(), diagnostics))
+        found.and_then(|found| value(key, found, &point.declared(), diagnostics))
     };
-    let (low, high) = (optional("low", text.low.as_ref()), optional("high", text.high.as_ref()));
+    let (least, most) = ends(point).unzip();
+    let low = optional("low", text.low.as_ref()).or(least);
+    let high = optional("high", text.high.as_ref()).or(most);
     let initial = optional("initial", text.initial.as_ref());
     let kind = match word {
         "level" => OperatorInputKind::Level,
@@ -178,7 +186,7 @@ fn operator(
         }
         _ => {
             for (key, found) in [("low", &text.low), ("high", &text.high)] {
-                if found.is_none() {
+                if found.is_none() && point.values.is_none() {
                     let message = format!("the setpoint `{}` has no `{key}`", point.name);
                     diagnostics.push(
                         Diagnostic::error("U0203", message, text.span.clone()).with_help(format!(
@@ -213,6 +221,7 @@ fn operator(
     (diagnostics.len() == before).then(|| {
         InputSourceKind::Operator(OperatorDeclaration {
             input,
+            declared: point.declared(),
             title: text.title.clone(),
             unit: text.unit.clone(),
             confirm: text.confirm,
@@ -268,7 +277,7 @@ impl Signal<'_> {
     ) -> Option<InputSourceKind> {
         let default = self
             .default
-            .and_then(|default| value("default", default, point.declared(), diagnostics));
+            .and_then(|default| value("default", default, &point.declared(), diagnostics));
         let Placed { value: from, span } = self.from?;
         let is_name = |text: &str| !text.is_empty() && !text.contains(['/', '*', '$', '?', '#']);
         if ![&group.group, &group.controller, &group.output].into_iter().all(|text| is_name(text)) {
@@ -295,6 +304,7 @@ impl Signal<'_> {
                 role: Role::Operator,
                 retains: false,
             },
+            declared: point.declared(),
             title: None,
             unit: None,
             confirm: false,
@@ -312,7 +322,7 @@ impl Signal<'_> {
     ) -> Option<InputSourceKind> {
         let default = self
             .default
-            .and_then(|default| value("default", default, point.declared(), diagnostics));
+            .and_then(|default| value("default", default, &point.declared(), diagnostics));
         let Placed { value: from, span } = self.from?;
         let unknown = |message: String, help: String| {
             Diagnostic::error("U0209", message, span.clone()).with_help(help)
@@ -343,7 +353,7 @@ impl Signal<'_> {
             return None;
         };
         let (sent, received) = (found.declared(), point.declared());
-        if !received.takes(sent) {
+        if !received.takes(&sent) {
             let message =
                 format!("`{from}` is {sent}, and the input `{}` is {received}", point.name);
             let help = match sent.of == received.of {

@@ -74,7 +74,7 @@ text = "Long pause"
     assert_eq!(level.priority, Priority::Critical);
     assert_eq!(level.action.as_deref(), Some("Close the inlet"));
     assert_eq!((open.name.as_str(), open.is_output), ("tank.open", true));
-    assert_eq!(open.condition, AlarmCondition::Is(false));
+    assert_eq!(open.condition, AlarmCondition::Is(0));
     assert_eq!((open.off_delay, open.priority), (50, Priority::Low));
     assert_eq!(count.condition, AlarmCondition::Below { limit: 3, over: 3 });
     let condition = AlarmCondition::Above { limit: 1_500_000_000, over: 1_000_000_000 };

@@ -84,6 +84,6 @@ fn no_value_is_infinite() {
         ("inf", Elementary::Real, false),
         ("NaN", Elementary::Lreal, false),
     ] {
-        assert_eq!(typed_value(text, of).is_ok(), is_one, "{text} {of}");
+        assert_eq!(typed_value(text, &of.into()).is_ok(), is_one, "{text} {of}");
     }
 }
