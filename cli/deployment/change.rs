@@ -1,7 +1,8 @@
-//! `understudy change`: an online change of programs, while the cluster runs.
+//! `understudy change`: an online change of programs and of settings of remote I/Os, while the cluster runs.
 
 mod difference;
 mod members;
+mod plan;
 mod rehearsal;
 
 use std::fmt::Write as _;
@@ -10,20 +11,18 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum, value_parser};
 use serde_json::{Value, json};
-use understudy_cluster::{
-    ChangeTexts, ChangedInitial, Cluster, NeedsStop, Overrides, changed_initials, done_pairs, fates,
-};
+use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides};
 use understudy_text::duration::parse_positive;
-use understudy_typed::{CarriedPath, Fate, Renamed};
 use understudy_view::Run;
 use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal};
 
 use self::difference::{Differences, newest_states};
 use self::members::{Members, gives};
+use self::plan::{NOTHING, Plan};
 use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Change the programs of a running cluster
+/// Change the programs and fail-safe settings of a running cluster
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -37,13 +36,13 @@ Example:
 Without a step, and with `plan`, it says what would change and which outputs can then differ, by proof, and touches nothing: from the newest state of
 a run, or from every state of the old program. `rehearse` computes what the new programs would have done with
 the samples of a run. `prepare` loads the new programs at all members next to the old ones;
-`switch` changes the programs between two cycles; `accept` ends the change with the new programs, `cancel` with the old ones. A step can be given again,
+`switch` changes the programs between two cycles; `accept` ends the change with the new programs and settings, `cancel` with the old ones. A step can be given again,
 also from another machine: it continues where the members are.")]
 pub(crate) struct Arguments {
     /// Cluster file that the members run, or directory of a running laboratory
     #[arg(value_name = "CLUSTER.toml|RUN")]
     before: PathBuf,
-    /// Cluster file with the new programs
+    /// Cluster file with the new programs and settings
     #[arg(value_name = "NEW.toml")]
     after: PathBuf,
     /// Step
@@ -85,11 +84,13 @@ enum Step {
     Prepare,
     /// Change the programs between two cycles
     Switch,
-    /// End the change with the new programs
+    /// End the change with the new programs and settings
     Accept,
     /// End the change with the old programs
     Cancel,
 }
+
+const NO_PROGRAM: &str = "no program changes: the settings of the new file count from `accept` on";
 
 /// Time limit for members that still need the other configuration: histories must leave the change behind.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -114,9 +115,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         let differences = Differences::of(&before, &after, &texts, live.as_ref(), budget);
         return Ok(plan.answer(&differences).with_used(used));
     }
-    if texts.programs.is_empty() {
-        let message = "the programs of the two files are equal: there is nothing to change";
-        return Err(Answer::failed(Status::BadInput, "U0630", message.to_owned()));
+    if texts.touched().is_empty() {
+        return Err(Answer::failed(Status::BadInput, "U0630", NOTHING.to_owned()));
+    }
+    if texts.programs.is_empty() && matches!(arguments.step, Step::Rehearse | Step::Switch) {
+        return Ok(Answer::done(NO_PROGRAM, json!({ "rehearsed": [], "members": [], "plan": [] })));
     }
     if arguments.step == Step::Rehearse {
         return rehearsal::rehearse(arguments, run.as_ref(), &before, &texts);
@@ -246,7 +249,7 @@ fn longest_trial(before: &Cluster, texts: &ChangeTexts) -> Duration {
         .programs
         .iter()
         .filter_map(|changed| before.remote_ios().get(changed.program.index()));
-    let cycles = remote_ios.map(|remote_io| remote_io.trial_cycles).max().unwrap_or(0);
+    let cycles = remote_ios.map(|remote_io| remote_io.fallback.trial_cycles).max().unwrap_or(0);
     before.agreement().schedule.period() * cycles
 }
 
@@ -261,7 +264,7 @@ fn needs_stop(reasons: &[NeedsStop]) -> Answer {
     let groups = [
         (
             "U0630",
-            "the change needs a stop, since an online change replaces programs only: make these settings equal in both files, or stop the cluster and start all members with the new file",
+            "the change needs a stop, since an online change replaces programs, and what remote I/Os do where nothing is proved, only: make these settings equal in both files, or stop the cluster and start all members with the new file",
         ),
         ("U0637", "variables cannot be renamed so: correct `renamed` of the new file"),
     ];
@@ -345,140 +348,5 @@ impl Asked {
             }
         }
         answer
-    }
-}
-
-/// What would change.
-struct Plan {
-    programs: Vec<PlannedProgram>,
-}
-
-/// What would become of the variables of one program.
-struct PlannedProgram {
-    name: String,
-    paths: Vec<CarriedPath>,
-    initials: Vec<ChangedInitial>,
-    /// Pairs that rename nothing any more.
-    done: Vec<Renamed>,
-}
-
-impl Plan {
-    fn of(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
-        let programs = texts.programs.iter().map(|changed| {
-            let place = changed.program.index();
-            let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
-            let paths = fates(&old.code, &new.code);
-            let initials = changed_initials(&old.code, &new.code, &paths);
-            let done = done_pairs(&old.code, &new.code);
-            PlannedProgram { name: new.name.clone(), paths, initials, done }
-        });
-        Self { programs: programs.collect() }
-    }
-
-    /// The way back, without the variables that only the new program has.
-    fn back(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
-        let mut plan = Self::of(after, before, texts);
-        for program in &mut plan.programs {
-            program.paths.retain(|path| path.now.is_some());
-        }
-        plan
-    }
-
-    fn drops(&self) -> bool {
-        let is_lost = |fate| matches!(fate, Fate::Dropped | Fate::Narrowed);
-        self.programs.iter().any(|program| program.paths.iter().any(|path| is_lost(path.fate)))
-    }
-
-    /// Refuses a change that drops values, unless the engineer says that it may; `what` says which values, and what becomes of them.
-    fn permit(&self, may_drop: bool, what: &str) -> Result<(), Answer> {
-        if may_drop || !self.drops() {
-            return Ok(());
-        }
-        let message = format!("{what}; with --drop it continues\n{}", self.text());
-        Err(Answer::failed(Status::BadInput, "U0635", message))
-    }
-
-    fn text(&self) -> String {
-        let mut text = String::new();
-        for PlannedProgram { name, paths, initials, done } in &self.programs {
-            let count = |fate| paths.iter().filter(|path| path.fate == fate).count();
-            let _ = writeln!(
-                text,
-                "{name}: {} variables kept, {} converted, {} narrowed, {} new, {} dropped",
-                count(Fate::Kept),
-                count(Fate::Converted),
-                count(Fate::Narrowed),
-                count(Fate::New),
-                count(Fate::Dropped)
-            );
-            let is_told =
-                |path: &&CarriedPath| path.fate != Fate::Kept || path.renamed_from.is_some();
-            for path in paths.iter().filter(is_told) {
-                let types = match (&path.before, &path.now) {
-                    (Some(before), Some(now)) if before != now => format!("{before} to {now}"),
-                    (Some(of), _) | (None, Some(of)) => of.clone(),
-                    (None, None) => String::new(),
-                };
-                let was = path.renamed_from.as_ref();
-                let was = was.map(|name| format!(", renamed from `{name}`")).unwrap_or_default();
-                let _ = writeln!(text, "  {:<9}  {}  {types}{was}", path.fate.name(), path.path);
-            }
-            for initial in initials {
-                let values = initial.values.as_ref();
-                let values = values.map(|[one, other]| format!(" from {one} to {other}"));
-                let values = values.unwrap_or_default();
-                let _ = writeln!(
-                    text,
-                    "  {}: the initial value changes{values}, which counts at the next start only",
-                    initial.path
-                );
-            }
-            for (before, now) in done {
-                let _ = writeln!(
-                    text,
-                    "  `{before}` is not renamed to `{now}`: the program before has `{now}`, which keeps its value"
-                );
-            }
-        }
-        text.trim_end().to_owned()
-    }
-
-    fn json(&self) -> Value {
-        let programs =
-            self.programs.iter().map(|PlannedProgram { name, paths, initials, done }| {
-                let paths = paths.iter().map(|path| {
-                    json!({
-                        "path": path.path,
-                        "fate": path.fate.name(),
-                        "renamed_from": path.renamed_from,
-                        "before": path.before,
-                        "now": path.now,
-                    })
-                });
-                let initials = initials.iter().map(|initial| {
-                    let [before, now] = match &initial.values {
-                        Some([one, other]) => [Some(one), Some(other)],
-                        None => [None, None],
-                    };
-                    json!({ "path": initial.path, "before": before, "now": now })
-                });
-                json!({
-                    "program": name,
-                    "paths": paths.collect::<Vec<_>>(),
-                    "initial_values": initials.collect::<Vec<_>>(),
-                    "renamed_before": done.iter().map(|(_, now)| now).collect::<Vec<_>>(),
-                })
-            });
-        Value::Array(programs.collect())
-    }
-
-    fn answer(&self, differences: &Differences) -> Answer {
-        let text = match self.programs.is_empty() {
-            true => {
-                "the programs of the two files are equal: there is nothing to change".to_owned()
-            }
-            false => format!("{}\n\n{}", self.text(), differences.text()),
-        };
-        Answer::done(text, json!({ "plan": self.json(), "differences": differences.json() }))
     }
 }

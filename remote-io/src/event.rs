@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
-use understudy_cycle::{Notice, Outvoted, Refusal};
+use understudy_cycle::{Notice, Outvoted, Refusal, ValueFault};
 use understudy_wire::{
     ConfigurationHash, Configurations, Force, Image, Lineage, Member, Moment, OrderRefusal, Part,
     ProgramHash, ProgramId, SignalPlace, Source, StationId, StationSet, Write, WriteId,
@@ -14,7 +14,6 @@ use understudy_wire::{
 };
 
 pub use self::reason::{AskReason, Lacking, LackingReason, Missing, OldInputs};
-use crate::settings::ValueFault;
 
 /// Event of a remote I/O.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::Mode;
+use understudy_cycle::{Mode, ValueFault};
 use understudy_wire::{Frame, Image, Lineage, ProgramId, Source, StationSet};
 
 use crate::event::Missing;
 use crate::selection::{Received, Selection};
-use crate::settings::ValueFault;
 use crate::trust::Trust;
 
 /// Turns of one cycle.

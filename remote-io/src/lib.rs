@@ -10,7 +10,6 @@ mod foresight;
 mod history;
 mod holders;
 mod paired_inputs;
-mod ramp;
 mod remote_io;
 mod selection;
 mod settings;
@@ -23,13 +22,9 @@ pub use diagnosis::Diagnosis;
 pub use event::{AskReason, Event, Lacking, LackingReason, Missing, OldInputs};
 pub use foresight::Foreseen;
 pub use paired_inputs::PairedInput;
-pub use ramp::Ramp;
 pub use remote_io::RemoteIo;
-pub use settings::{
-    PairSettings, Release, Restart, SWITCHOVER, Settings, StaleState, StopPoints, ValueFault,
-    Wiring,
-};
-pub use source::{
-    OperatorInput, OperatorInputKind, PointPlace, SignalInput, SignalSource, ValueMismatch,
-    in_order,
+pub use settings::{PairSettings, SWITCHOVER, Settings, StopPoints, Wiring};
+pub use source::{OperatorInput, OperatorInputKind, SignalInput, SignalSource, ValueMismatch};
+pub use understudy_cycle::{
+    Fallback, PointPlace, Ramp, Release, Restart, StaleState, ValueFault, in_order,
 };

@@ -12,9 +12,8 @@
 //! Invariant: while two readings differ and neither module is excluded, the value that was sampled last counts. A doubt ends by two readings, by an
 //! exclusion, or by the operator, and by nothing else.
 
+use understudy_cycle::PointPlace;
 use understudy_wire::Image;
-
-use crate::source::PointPlace;
 
 /// An input that modules of both remote I/Os read.
 #[derive(Debug, Clone, Copy, PartialEq)]

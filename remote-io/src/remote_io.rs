@@ -40,7 +40,9 @@ mod writing;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
+use understudy_cycle::{
+    Arrival, Descent, Input, Machine, Output, Outvoted, Participant, RemoteIoInput,
+};
 use understudy_wire::{
     Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
     ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
@@ -49,7 +51,6 @@ use understudy_wire::{
 use crate::diagnosis::Diagnosing;
 use crate::event::{Event, Missing};
 use crate::holders::Holders;
-use crate::ramp::Descent;
 use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::trust::Trust;

@@ -14,13 +14,12 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::Mode;
+use understudy_cycle::{Mode, ValueFault};
 use understudy_wire::{
     Body, Frame, Holding, Image, Lineage, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
 };
 
 use crate::event::Missing;
-use crate::settings::ValueFault;
 use crate::trust::{Accusation, Judgement, Trust};
 use crate::votes::{Vote, Votes};
 

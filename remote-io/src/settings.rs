@@ -2,15 +2,13 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-use understudy_cycle::Agreement;
+use understudy_cycle::{Agreement, Fallback, PointPlace};
 use understudy_wire::{Image, ProgramHash, ProgramId};
 
 use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;
 use crate::paired_inputs::PairedInput;
-use crate::ramp::Ramp;
-use crate::source::{OperatorInput, PointPlace, SignalInput, SignalSource};
+use crate::source::{OperatorInput, SignalInput, SignalSource};
 
 /// Configuration of one remote I/O.
 #[derive(Debug, Clone)]
@@ -39,22 +37,8 @@ pub struct Settings {
     pub stop: Option<StopPoints>,
     /// Ladder that finds failed channels that do not report it.
     pub diagnosis: Option<Arc<Diagnosis>>,
-    /// Cycles for which the last proven outputs are held.
-    pub hold_cycles: u32,
-    /// Cycles after the switch of an online change in which a program fault takes the change back; never where it is 0.
-    pub trial_cycles: u32,
-    /// Fail-safe y(i), applied after that; its width is that of the outputs.
-    pub fail_safe: Image,
-    /// Outputs that move to their fail-safe values by a ramp.
-    pub ramps: Vec<Ramp>,
-    /// Who releases the outputs after a cold start.
-    pub release: Release,
-    /// Reaction to a value fault that no majority locates.
-    pub value_fault: ValueFault,
-    /// Reaction to a lost state.
-    pub stale_state: StaleState,
-    /// Start after a power failure; `None` of a program that has no retentive variables.
-    pub restart: Option<Restart>,
+    /// What it does where nothing is proved.
+    pub fallback: Fallback,
     /// Where the program has a second remote I/O.
     pub pair: Option<PairSettings>,
     /// Inputs that modules of both remote I/Os read; of no importance where only the author is wired to the plant.
@@ -123,53 +107,4 @@ pub struct StopPoints {
     pub stopped: usize,
     /// Bit of u(i): the program starts again from its initial state.
     pub reset: usize,
-}
-
-/// Reaction where no living station can prove the state of the newest applied output, and one holds an older state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum StaleState {
-    /// The outputs are held, then fail-safe, until the operator chooses the older state or a cold start.
-    #[default]
-    Operator,
-    /// The program starts cold.
-    Cold,
-}
-
-/// Start of a program with retentive variables after a power failure, where no station holds its state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Restart {
-    /// From the initial state with the retentive values of the newest retained state.
-    #[default]
-    Warm,
-    /// From the initial state, whatever was kept.
-    Cold,
-    /// The operator chooses between the two.
-    Operator,
-}
-
-/// Reaction where two stations publish different outputs of one history, and no third one makes a majority.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ValueFault {
-    /// The last proven outputs for the configured cycles, then the fail-safe ones, until the stations agree again, a
-    /// third one makes a majority, or the operator releases them.
-    #[default]
-    Hold,
-    /// The outputs of the controller, which may be wrong.
-    Alarm,
-    /// The fail-safe outputs, at once, until the operator releases them.
-    FailSafe,
-}
-
-/// Who releases the outputs after a program has started cold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Release {
-    /// No release is needed: outputs are applied as soon as they are proven.
-    #[default]
-    Automatic,
-    /// The operator, by a command; fail-safe until then.
-    Operator,
 }

@@ -11,7 +11,9 @@ use std::alloc::System;
 use bench::{Bench, PERIOD, held_after, join, settings, turn};
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
-use understudy_remote_io::{Event, OperatorInput, OperatorInputKind, PointPlace, Settings};
+use understudy_remote_io::{
+    Event, Fallback, OperatorInput, OperatorInputKind, PointPlace, Settings,
+};
 use understudy_typed::Elementary;
 use understudy_wire::{
     Body, Force, Holding, Image, PointValue, Role, Sample, SignalPlace, Source, StateChoice, Time,
@@ -40,7 +42,7 @@ fn with(width: u16) -> Settings {
     };
     Settings {
         undriven: Image::zero(bits),
-        fail_safe: Image::zero(bits),
+        fallback: Fallback { fail_safe: Image::zero(bits), ..settings(1).fallback },
         input_points: PointPlace::booleans(width),
         output_points: PointPlace::booleans(width),
         operator_inputs: vec![operator_input],

@@ -20,10 +20,16 @@ fn verdict<'a>(json: &'a Value, output: &str) -> &'a Value {
 }
 
 fn write(folder: &Path, name: &str, text: &str) {
+    write_with(folder, name, text, "");
+}
+
+/// With settings of the remote I/O.
+fn write_with(folder: &Path, name: &str, text: &str, settings: &str) {
     let cluster = "[cluster]\nname = \"cell\"\nperiod = \"10ms\"\nsecurity = \"off\"\n\n[[controller]]\nname = \"one\"\nladder = \"one.st\"\n\n\
          [[remote_io]]\ncontroller = \"one\"\n";
     let folder = folder.join(name);
     fs::create_dir_all(&folder).expect("a folder");
+    let cluster = format!("{cluster}{settings}\n");
     fs::write(folder.join("cluster.toml"), cluster).expect("a cluster");
     fs::write(folder.join("one.st"), text).expect("a program");
 }
@@ -119,4 +125,47 @@ fn a_value_that_is_not_followed_leaves_the_rest_proved() {
     assert_eq!(full["verdict"], "undecided", "{json}");
     let why = full["reason"].as_str().unwrap_or_default();
     assert!(why.contains("`parts` has another type"), "{full}");
+}
+
+#[test]
+fn the_plan_lists_settings_and_what_needs_a_stop_beside_them() {
+    let folder = empty_folder("change_settings");
+    let program = "PROGRAM one\n VAR_INPUT start : BOOL; END_VAR\n VAR_OUTPUT valve : BOOL; END_VAR\n valve := start;\nEND_PROGRAM\n";
+    let settings = "hold_cycles = 10\nfail_safe = { valve = true }";
+    let twin = "twin = { name = \"second\", wiring = \"exclusive\" }";
+    write(&folder, "old", program);
+    write_with(&folder, "new", program, settings);
+    write_with(&folder, "stop", program, &format!("{settings}\n{twin}"));
+    let change = |new: &str, more: &[&str]| {
+        let new = format!("{new}/cluster.toml");
+        understudy_in(&folder, &[&["change", "old/cluster.toml", &new], more].concat())
+    };
+    let plan = change("new", &[]);
+    assert_eq!(plan.status, 0, "{}", plan.errors);
+    assert_eq!(
+        plan.output.trim(),
+        "From `accept` on, and no sooner:\n  `hold_cycles` of remote I/O `one-io` changes from `3` to `10`\n  `fail_safe.valve` of remote I/O `one-io` changes from `FALSE` to `TRUE`"
+    );
+    let json = change("new", &["--json"]).json();
+    let settings = &json["result"]["settings"];
+    assert_eq!(settings[0]["of"], "remote I/O one-io", "{json}");
+    assert_eq!(
+        (&settings[0]["setting"], &settings[0]["now"]),
+        (&"hold_cycles".into(), &"10".into())
+    );
+    // There is no program to compute with, or to change between two cycles.
+    for step in ["rehearse", "switch"] {
+        let answer = change("new", &[step]);
+        assert_eq!(answer.status, 0, "{}", answer.errors);
+        assert!(answer.output.contains("count from `accept` on"), "{}", answer.output);
+    }
+    let refused = change("stop", &["--json"]);
+    let json = refused.json();
+    let failures = json["failures"].as_array().expect("failures");
+    assert!(failures.iter().all(|failure| failure["code"] == "U0630"), "{json}");
+    let last = failures.last().and_then(|failure| failure["message"].as_str());
+    assert!(last.is_some_and(|it| it.contains("`twin` of remote I/O `one-io` changes")), "{json}");
+    let equal = change("old", &["prepare"]);
+    assert_eq!(equal.status, 2, "{}", equal.output);
+    assert!(equal.errors.contains("there is nothing to change"), "{}", equal.errors);
 }

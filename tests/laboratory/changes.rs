@@ -62,11 +62,20 @@ fn write_cluster(folder: &Path, counter: &str) -> String {
 
 /// With keys of the controller.
 fn write_cluster_with(folder: &Path, counter: &str, keys: &str) -> String {
+    let ladder = "ladder = \"counter.st\"";
+    write_files(folder, counter, &CLUSTER.replace(ladder, &format!("{ladder}\n{keys}")))
+}
+
+/// With settings of the remote I/O of the counter.
+fn write_cluster_falling_back(folder: &Path, counter: &str, settings: &str) -> String {
+    let remote_io = "[[remote_io]]\ncontroller = \"counter\"";
+    write_files(folder, counter, &CLUSTER.replace(remote_io, &format!("{remote_io}\n{settings}")))
+}
+
+fn write_files(folder: &Path, counter: &str, cluster: &str) -> String {
     fs::create_dir_all(folder).expect("a folder");
     let file = folder.join("cluster.toml");
-    let ladder = "ladder = \"counter.st\"";
-    let cluster = CLUSTER.replace(ladder, &format!("{ladder}\n{keys}"));
-    for (name, text) in [("cluster.toml", &*cluster), ("counter.st", counter), ("lamp.st", LAMP)] {
+    for (name, text) in [("cluster.toml", cluster), ("counter.st", counter), ("lamp.st", LAMP)] {
         fs::write(folder.join(name), text).expect("written");
     }
     file.to_str().expect("text").to_owned()
@@ -281,4 +290,86 @@ fn a_program_fault_takes_a_change_back() {
     let around = counts.windows(2).find(|pair| pair[1].0 == pair[0].0 + 2);
     let around = around.expect("the fault costs a cycle");
     assert_eq!(around[1].1 - around[0].1, 1, "{around:?}");
+}
+
+/// The sources of the outputs of the counter's remote I/O and what they are, in the order of the journal.
+fn applied(journal: &str) -> Vec<(String, u64)> {
+    let records = journal.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let applied = records.filter(|record| is(record, "counter-io", "applied"));
+    let shown = applied.filter_map(|record| {
+        let event = &record["event"];
+        let source = event["source"].as_str()?.to_owned();
+        Some((source, event["outputs"]["words"][0].as_u64()?))
+    });
+    shown.collect()
+}
+
+/// Fail-safe values alone change while a remote I/O is killed in the middle: the new ones are driven where all stations die after the acceptance, and
+/// explained as such.
+#[test]
+fn fail_safe_values_change_while_a_remote_io_is_killed() {
+    let _one = some_at_a_time();
+    let out = empty_folder("changes-settings");
+    let program = counter("DINT", 1);
+    let settings = |value: u32| format!("hold_cycles = 2\nfail_safe = {{ shown = {value} }}");
+    let before = write_cluster_falling_back(&out.join("before"), &program, &settings(1_000_000));
+    let after = write_cluster_falling_back(&out.join("after"), &program, &settings(2_000_000));
+    let runs = out.join("runs");
+    let more = ["--cycles", "100000", "--allow-commands"];
+    let (child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    let commander = Commander::of_run(run.clone());
+    let mut records = Records::of(&run);
+    let act = |member: Member, command: Command| {
+        let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+        let action = OperatorAction::Command { member, command, owner, reason };
+        commander.act_and_wait(&action).expect("it is done");
+    };
+    let run_text = run.to_str().expect("text");
+    let done = |word: &str| {
+        let (exit, document, errors) = answer(&["change", run_text, &after, word]);
+        assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+        document
+    };
+    let plan = done("plan");
+    let setting = &plan["result"]["settings"][0];
+    assert_eq!(setting["setting"], "fail_safe.shown", "{plan:#}");
+    assert_eq!((&setting["before"], &setting["now"]), (&"1000000".into(), &"2000000".into()));
+    done("prepare");
+    let remote_io = Member::RemoteIo(ProgramId(0));
+    for command in [Command::Kill, Command::Restart] {
+        act(remote_io, command);
+    }
+    records.wait_for("its start", |record| is(record, "counter-io", "adopted-lineage"));
+    done("switch");
+    done("accept");
+    done("accept");
+    for command in [Command::Kill, Command::Restart] {
+        act(remote_io, command);
+    }
+    records.wait_for("its start", |record| is(record, "counter-io", "adopted-lineage"));
+    for station in [0, 2] {
+        act(Member::Station(StationId(station)), Command::Kill);
+    }
+    let is_new = |record: &Value| {
+        let event = &record["event"];
+        let is_new = event["outputs"]["words"][0] == 2_000_000;
+        is(record, "counter-io", "applied") && event["source"] == "fail-safe" && is_new
+    };
+    records.wait_for("the new value", is_new);
+    let (exit, document, errors) = answer(&["why", "counter.shown", run_text]);
+    assert_eq!(exit, 0, "{document:#} {errors}");
+    assert!(document["result"]["ramp_to"].is_null(), "{document:#}");
+    ended_well(child, &runs, &run);
+    let applied = applied(&fs::read_to_string(run.join("journal.jsonl")).expect("a journal"));
+    let proved = applied.iter().position(|(source, _)| source == "direct").expect("it ran");
+    let last = applied.iter().rposition(|(source, _)| source == "direct").expect("it ran");
+    // One that starts drives what it falls back to while it listens: that of its configuration.
+    let fallen: Vec<u64> = applied[proved..]
+        .iter()
+        .filter(|(source, _)| source == "fail-safe")
+        .map(|(_, value)| *value)
+        .collect();
+    assert!(fallen.is_sorted() && fallen.contains(&2_000_000), "{fallen:?}");
+    assert!(applied[last..].iter().all(|(_, value)| *value != 1_000_000), "{:?}", &applied[last..]);
 }

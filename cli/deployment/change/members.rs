@@ -92,11 +92,12 @@ impl<'a> Members<'a> {
         Ok(asked)
     }
 
-    /// The remote I/Os of the programs that change, and all other members.
+    /// The remote I/Os that have another program or other settings by the change, and all other members.
     pub(super) fn deciding(&self, texts: &ChangeTexts) -> [Vec<Member>; 2] {
+        let touched = texts.touched();
         let decides = |member: &Member| {
-            let of = |program| [Member::RemoteIo(program), Member::Twin(program)].contains(member);
-            texts.programs.iter().any(|changed| of(changed.program))
+            let program = member.sampled_program();
+            program.is_some_and(|program| touched.contains(&program))
         };
         let (first, others) = self.all().into_iter().partition(decides);
         [first, others]

@@ -232,6 +232,7 @@ impl Pairs {
                         Output::Retain(_)
                         | Output::Follow(_)
                         | Output::Connect(_)
+                        | Output::EndWith(_)
                         | Output::Answer(_)
                         | Output::Obeyed(_) => {}
                     }
@@ -254,6 +255,7 @@ impl Pairs {
                         | Output::Drive { .. }
                         | Output::Follow(_)
                         | Output::Connect(_)
+                        | Output::EndWith(_)
                         | Output::Answer(_)
                         | Output::Obeyed(_)
                         | Output::Retain(_) => {}

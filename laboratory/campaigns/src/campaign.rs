@@ -233,7 +233,7 @@ fn shadow_that_counts(cluster: &Cluster, shadow_cycles: f64) -> f64 {
     match cluster.agreement().mode {
         Mode::Full => 0.0,
         Mode::Paper => {
-            let held = cluster.remote_ios().iter().map(|place| place.hold_cycles);
+            let held = cluster.remote_ios().iter().map(|place| place.fallback.hold_cycles);
             (shadow_cycles - f64::from(held.min().unwrap_or(0))).max(0.0)
         }
     }

@@ -242,8 +242,19 @@ impl PlantMachine {
     #[must_use]
     pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
         // One that is refused is of another cluster file, and its members say so.
-        let _ = self.endpoint.restore_change(Arc::clone(change), configurations);
+        if self.endpoint.restore_change(Arc::clone(change), configurations).is_ok() {
+            self.take_fail_safe(change);
+        }
         self
+    }
+
+    /// The values of its watchdog are those of its own configuration. Modules of two remote I/Os are released in every one.
+    fn take_fail_safe(&mut self, change: &OnlineChange) {
+        let own = self.endpoint.configurations().own;
+        let fallback = change.fallback_in(own, self.settings.program);
+        if let Some(fallback) = fallback.filter(|_| !self.settings.has_two_modules) {
+            self.settings.fail_safe.clone_from(&fallback.fail_safe);
+        }
     }
 
     fn send_field(&mut self, moment: Moment, field: Field) {
@@ -259,7 +270,12 @@ impl Machine for PlantMachine {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.hear(now, frame),
-            Input::Change(order) => self.endpoint.take_change(now, order, true),
+            Input::Change(order) => {
+                self.endpoint.take_change(now, order, true);
+                if let Some(change) = self.endpoint.changing().change().cloned() {
+                    self.take_fail_safe(&change);
+                }
+            }
             Input::RemoteIo(_) => {}
         }
     }

@@ -3,15 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
+use understudy_cycle::{
+    Agreement, ChangeOrder, Fallback, FallbackChange, Input, Machine, Mode, OnlineChange, Output,
+    Release, Schedule, StaleState, ValueFault,
+};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{
     BindingProblem, Direction, Event, ModelKind, Pace, Plant, PlantMachine, PressParameters,
     Settings, Signals, WATCHDOG_CYCLES,
 };
 use understudy_wire::{
-    Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
-    Member, Moment, ProgramId, Time, decode, encode,
+    Actuation, Body, ClusterHash, ConfigurationHash, Configurations, Cycle, Epoch, Field, Frame,
+    Header, Image, Member, Moment, ProgramId, Time, decode, encode,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -370,4 +373,57 @@ fn two_modules_drive_one_actuator_through_diodes() {
     }
     // What is configured; of two modules it is 0, which the cluster file sees to.
     assert_eq!((last.first(), last.last()), (Some(&on), Some(&[false, true])), "{last:?}");
+}
+
+/// What the actuators get when the watchdog has run out.
+fn falls_to(machine: &mut PlantMachine, now: Time) -> [bool; 2] {
+    drive(machine, now, 1, Member::RemoteIo(PRESS), [true, false]);
+    let mut last = [true, false];
+    for period in 1..10 {
+        machine.handle_input(now + PERIOD * period, Input::Wakeup);
+        last = stepped(machine).pop().unwrap_or(last);
+    }
+    last
+}
+
+/// The values of its watchdog are those of its own configuration in an online change, also where it starts in the middle; modules are released always.
+#[test]
+fn the_watchdog_has_the_fail_safe_values_of_its_configuration() {
+    let [own, other] = [ConfigurationHash(2), ConfigurationHash(3)];
+    let fallback = |bits: [bool; 2]| Fallback {
+        hold_cycles: 3,
+        trial_cycles: 0,
+        fail_safe: Image::from_bits(bits),
+        ramps: Vec::new(),
+        release: Release::Automatic,
+        value_fault: ValueFault::Hold,
+        stale_state: StaleState::Operator,
+        restart: None,
+    };
+    let [old, new] = [[false, true], [true, true]];
+    let changed = FallbackChange { program: PRESS, before: fallback(old), after: fallback(new) };
+    let change = Arc::new(OnlineChange {
+        before: own,
+        after: other,
+        programs: Vec::new(),
+        fallbacks: vec![changed],
+    });
+    let run = |configuration| ChangeOrder::Run(change.name(), configuration);
+    let orders = [ChangeOrder::Prepare(Arc::clone(&change)), run(other), run(own)];
+    for (count, wanted) in [(0, old), (1, old), (2, new), (3, old)] {
+        let mut machine = machine();
+        for order in orders.iter().take(count) {
+            machine.handle_input(Time(0), Input::Change(order));
+        }
+        assert_eq!(falls_to(&mut machine, Time(0)), wanted, "{count} orders");
+    }
+    for (configurations, wanted) in [
+        (Configurations { own, prepared: Some(other) }, old),
+        (Configurations { own: other, prepared: Some(own) }, new),
+    ] {
+        let mut alone = machine().changed(&change, configurations);
+        assert_eq!(falls_to(&mut alone, Time(0)), wanted);
+        let mut modules = machine_with(true).changed(&change, configurations);
+        assert_eq!(falls_to(&mut modules, Time(0)), [false, true], "as it was made");
+    }
 }

@@ -21,6 +21,7 @@
 //! stations, reports one that was not necessary.
 
 mod descent;
+mod fallbacks;
 mod pair;
 mod steps;
 mod unrecorded;
@@ -32,10 +33,11 @@ use std::sync::Arc;
 
 use understudy_cycle::{OnlineChange, Program, Versions};
 use understudy_executable::{Executable, Scratch};
-use understudy_remote_io::{Event, Ramp, Settings};
+use understudy_remote_io::{Event, Settings};
 use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, ProgramId, Source, Step};
 
 use descent::Descent;
+use fallbacks::Fallbacks;
 use pair::Pair;
 use unrecorded::Unrecorded;
 pub use violation::Violation;
@@ -58,9 +60,7 @@ pub struct Referee {
     /// The online change that its program may go through.
     change: Option<Arc<OnlineChange>>,
     place: ProgramId,
-    fail_safe: Image,
-    ramps: Vec<Ramp>,
-    hold_cycles: u32,
+    fallbacks: Fallbacks,
     scratch: Scratch,
     /// The states that the samples led to, newest last.
     states: VecDeque<State>,
@@ -107,10 +107,7 @@ impl Hash for Referee {
         self.states.range(self.floor..).for_each(|state| state.hash(hasher));
         let newest = self.newest.map(|place| place - self.floor.min(place));
         (newest, &self.truth, &self.last_true).hash(hasher);
-        // Without ramps there is one way to the fail-safe values.
-        if !self.ramps.is_empty() {
-            self.descent.hash(hasher);
-        }
+        self.hash_fallbacks(hasher);
         (self.held, self.blind, self.choice, self.applied, &self.pair).hash(hasher);
     }
 }
@@ -122,9 +119,7 @@ impl Referee {
             program: Program { hash: settings.hash, executable },
             change: None,
             place: settings.program,
-            fail_safe: settings.fail_safe.clone(),
-            ramps: settings.ramps.clone(),
-            hold_cycles: settings.hold_cycles,
+            fallbacks: Fallbacks::new(settings.agreement.configuration, settings.fallback.clone()),
             scratch: Scratch::default(),
             states: VecDeque::new(),
             floor: 0,
@@ -184,6 +179,7 @@ impl Referee {
     /// The remote I/O starts again.
     pub fn starts_again(&mut self) {
         self.is_new = true;
+        self.fallbacks.starts_again();
     }
 
     /// How often the remote I/O was killed with more samples that left no record than can be found: what came after was not judged, until
@@ -277,6 +273,10 @@ impl Referee {
                 Ok(())
             }
             Event::Applied { moment, outputs, source, .. } => self.judge(*moment, outputs, *source),
+            Event::Configured(configurations) => {
+                self.configured(configurations.own);
+                Ok(())
+            }
             _ => Ok(()),
         }
     }
@@ -408,7 +408,7 @@ impl Referee {
     }
 
     fn judge(&mut self, moment: Moment, driven: &Image, source: Source) -> Result<(), Violation> {
-        if source != Source::FailSafe && !self.ramps.is_empty() {
+        if source != Source::FailSafe && self.has_ramps() {
             self.descent.begins_at(driven);
         }
         match source {
@@ -440,7 +440,7 @@ impl Referee {
             }
             Source::Held => {
                 self.held += 1;
-                if self.held <= self.hold_cycles && self.last_true.as_ref() == Some(driven) {
+                if self.may_hold() && self.last_true.as_ref() == Some(driven) {
                     return Ok(());
                 }
                 Err(Violation::WronglyHeld {
@@ -453,14 +453,15 @@ impl Referee {
             Source::FailSafe => {
                 self.held = 0;
                 self.last_true = None;
-                let descent = &mut self.descent;
-                if descent.permits(driven, &self.fail_safe, &self.ramps) {
+                self.descent.goes_on();
+                if self.may_fall_back_to(driven) {
+                    self.descent.drives(driven);
                     return Ok(());
                 }
                 Err(Violation::NotTheFailSafe {
                     moment,
                     driven: driven.clone(),
-                    configured: self.fail_safe.clone(),
+                    configured: self.fail_safe().cloned().unwrap_or_default(),
                 })
             }
         }

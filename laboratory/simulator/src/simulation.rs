@@ -447,6 +447,7 @@ impl Simulation {
                 Output::Drive { .. }
                 | Output::Follow(_)
                 | Output::Connect(_)
+                | Output::EndWith(_)
                 | Output::Answer(_)
                 | Output::Obeyed(_) => {}
             }
@@ -469,7 +470,7 @@ impl Simulation {
                 }
                 Output::Follow(outputs) => self.follow(member, program, &outputs, observe),
                 Output::Connect(true) => self.show_field(program),
-                Output::Connect(false) => {}
+                Output::Connect(false) | Output::EndWith(_) => {}
                 Output::Report(event) => {
                     if let understudy_remote_io::Event::Configured(configurations) = event {
                         self.disks.configure(member, configurations);

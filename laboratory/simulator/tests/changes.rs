@@ -32,6 +32,10 @@ trial_cycles = 10
 controller = "lamp"
 "#;
 
+/// Settings of the remote I/O of the counter in the new file: they count from the acceptance on.
+const NEW_SETTINGS: &str =
+    "trial_cycles = 10\nhold_cycles = 6\nfail_safe = { shown = 4711 }\nramp = { shown = 1000 }";
+
 /// Counts scans.
 const BEFORE: &str = "
 PROGRAM counter
@@ -77,8 +81,11 @@ fn cluster(counter: &str) -> Cluster {
 /// With keys of the controller.
 fn cluster_with(counter: &str, keys: &str) -> Cluster {
     let file = "ladder = \"counter.st\"";
-    let text = CLUSTER.replace(file, &format!("{file}\n{keys}"));
-    let loaded = read("cluster.toml", &text, &mut |name| match name {
+    read_cluster(counter, &CLUSTER.replace(file, &format!("{file}\n{keys}")))
+}
+
+fn read_cluster(counter: &str, text: &str) -> Cluster {
+    let loaded = read("cluster.toml", text, &mut |name| match name {
         "counter.st" => Ok(counter.to_owned()),
         _ => Ok(LAMP.to_owned()),
     });
@@ -98,11 +105,12 @@ fn changing() -> Parts {
 }
 
 fn changing_between(before: &str, after: &str) -> Parts {
-    changing_clusters(&cluster(before), &cluster(after))
+    let after = read_cluster(after, &CLUSTER.replace("trial_cycles = 10", NEW_SETTINGS));
+    changing_clusters(&cluster(before), &after)
 }
 
 fn changing_clusters(before: &Cluster, after: &Cluster) -> Parts {
-    let texts = ChangeTexts::between(before, after).expect("only a program differs");
+    let texts = ChangeTexts::between(before, after).expect("an online change");
     let change = texts.load(before).expect("it is of this cluster");
     Parts { change: Some(Arc::new(change)), ..parts(before) }
 }

@@ -444,7 +444,7 @@ fn a_changed_sample_is_no_history() {
 fn a_cold_start_waits_for_the_operator() {
     let mut parts = press_cell::parts(Mode::Full, 1);
     for settings in &mut parts.remote_ios {
-        settings.release = understudy_remote_io::Release::Operator;
+        settings.fallback.release = understudy_remote_io::Release::Operator;
     }
     let mut simulation = Simulation::new(parts, Network::default(), 1);
     let nobody = simulation.run(1, 100, &mut |_, _, _, _| {});

@@ -195,7 +195,7 @@ fn a_station_that_comes_back_as_its_program_starts_cold_is_too_late_or_continues
 fn stale(length: u64, stale_state: StaleState, ends: Action) -> Simulation {
     let mut parts = press_cell::parts(Mode::Full, 1);
     for remote_io in &mut parts.remote_ios {
-        remote_io.stale_state = stale_state;
+        remote_io.fallback.stale_state = stale_state;
     }
     let mut simulation = Simulation::new(parts, Network::default(), 1);
     let to = Member::Station(UNDERSTUDY);

@@ -25,7 +25,7 @@ struct Outcome {
 fn run(understudies: usize, answer: ValueFault, faults: &[(u64, f64, Member, Action)]) -> Outcome {
     let mut parts = press_cell::parts(Mode::Full, understudies);
     for settings in &mut parts.remote_ios {
-        settings.value_fault = answer;
+        settings.fallback.value_fault = answer;
     }
     let mut simulation = Simulation::new(parts, Network::default(), 1);
     for &(at_cycle, phase, member, action) in faults {

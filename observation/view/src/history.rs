@@ -57,6 +57,8 @@ pub struct Driven {
     pub heard: StationSet,
     /// u(i) as last sampled, in this cycle or before.
     pub inputs: Option<Image>,
+    /// The fail-safe values of the remote I/O's configuration, where the outputs are fail-safe and these are known.
+    pub fail_safe: Option<Image>,
 }
 
 /// One cycle of one program.
@@ -95,8 +97,6 @@ pub struct History {
     awaited: Option<(Moment, (Option<ProgramHash>, Lineage), Image)>,
     end: End,
     order: Order,
-    /// Whether fail-safe outputs depend on earlier deadlines.
-    has_ramps: bool,
 }
 
 /// Whether the oldest state that is known was not enough for an answer.
@@ -141,7 +141,6 @@ impl History {
             awaited: None,
             end: End::default(),
             order: Order::default(),
-            has_ramps: !settings.ramps.is_empty(),
         })
     }
 
@@ -370,6 +369,9 @@ impl History {
                     missing: *missing,
                     heard: *heard,
                     inputs: None,
+                    fail_safe: (*source == Source::FailSafe)
+                        .then(|| self.referee.fail_safe().cloned())
+                        .flatten(),
                 };
                 match self.steps.back_mut() {
                     Some(last) if last.moment == *moment && last.driven.is_none() => {
@@ -409,7 +411,9 @@ impl History {
                 return None;
             }
             Some(Violation::WronglyHeld { .. }) if self.order.is_cut() => return None,
-            Some(Violation::NotTheFailSafe { .. }) if self.order.is_cut() && self.has_ramps => {
+            Some(Violation::NotTheFailSafe { .. })
+                if self.order.is_cut() && self.referee.has_ramps() =>
+            {
                 return None;
             }
             // Of a state and a sample that are known; a state before the floor is none that follows it, whatever is missing.

@@ -262,9 +262,9 @@ impl Model {
                 }
             }
         };
-        let fail_safe = &self.cluster.remote_ios()[program.index()].fail_safe;
-        let configured = output.map(|output| value_in(output, fail_safe));
-        let on_ramp = source == Some(Source::FailSafe) && configured != unforced;
+        let fail_safe = decided.and_then(|driven| driven.fail_safe.as_ref());
+        let configured = output.zip(fail_safe).map(|(output, values)| value_in(output, values));
+        let on_ramp = configured.is_some() && configured != unforced;
         let value =
             driven.or(because.as_ref().map(|reason| reason.value.clone())).unwrap_or_default();
         let sampled = step.sampled.as_ref().into_iter();

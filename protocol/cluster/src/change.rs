@@ -1,21 +1,30 @@
 //! An online change between two cluster files: what it replaces, and why it needs a stop where it does.
 
+mod error;
+mod fallback;
+mod plan;
 mod settings;
 mod unfit;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
-use understudy_typed::{CarriedPath, Fate, Fault, Program as TypedProgram, Renamed, Successor};
+use understudy_cycle::{
+    Agreement, Conversion, Fallback, FallbackChange, OnlineChange, Program, ProgramChange,
+};
+use understudy_typed::{Fault, Program as TypedProgram, Renamed, Successor};
 use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
+pub use self::error::ChangeError;
+pub use self::fallback::{ChangedFallback, FallbackText};
+pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_pairs, fates};
 pub use self::settings::ChangedSetting;
 use self::settings::changed_settings;
 pub use self::unfit::{PairReason, Unfit};
 use crate::cluster::Cluster;
 use crate::code::Code;
-use crate::configuration::with_programs;
+use crate::configuration::{fallback_text, filled};
 use crate::source_text::read_kept;
 
 /// The online changes of one run, one after another: each is loaded by what the ones before it have led to.
@@ -44,7 +53,7 @@ impl OnlineChanges {
     }
 }
 
-/// What every member is given to prepare an online change: the texts of the programs that change, before and after.
+/// What every member is given to prepare an online change: the programs and the settings of remote I/Os that change, before and after.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChangeTexts {
@@ -56,6 +65,9 @@ pub struct ChangeTexts {
     pub after: ConfigurationHash,
     /// The programs that change, each once, in the order of the cluster.
     pub programs: Vec<ChangedText>,
+    /// What the remote I/Os do where nothing is proved, of each for which that changes, once, in the order of the cluster.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fallbacks: Vec<ChangedFallback>,
 }
 
 /// One program that changes.
@@ -101,7 +113,7 @@ pub enum NeedsStop {
     /// A program cannot be replaced while it runs.
     #[error(transparent)]
     Unfit(#[from] Unfit),
-    /// Something else than a program differs.
+    /// Something differs that no online change replaces.
     #[error("{0}")]
     Setting(ChangedSetting),
 }
@@ -131,9 +143,19 @@ impl ChangeTexts {
         reasons.extend(changed.into_iter().map(NeedsStop::Setting));
         let pairs = before.controllers().iter().zip(after.controllers());
         let pairs = pairs.filter(|(old, new)| old.name == new.name);
-        let mut programs = Vec::new();
+        let (mut programs, mut fallbacks) = (Vec::new(), Vec::new());
         for (place, (old, new)) in (0..).zip(pairs) {
-            reasons.extend(Unfit::points(&old.name, &old.code, &new.code).map(NeedsStop::from));
+            let points = Unfit::points(&old.name, &old.code, &new.code);
+            let is_unfit = points.is_some();
+            reasons.extend(points.map(NeedsStop::from));
+            let remote_ios =
+                [before, after].map(|cluster| cluster.remote_ios.get(usize::from(place)));
+            if let ([Some(old), Some(new)], false) = (remote_ios, is_unfit) {
+                match ChangedFallback::between(ProgramId(place), old, new) {
+                    Ok(changed) => fallbacks.extend(changed),
+                    Err(changed) => reasons.push(NeedsStop::Setting(changed)),
+                }
+            }
             if old.hash != new.hash {
                 let of_program = Unfit::memory(&old.name, &old.code, &new.code).into_iter();
                 let of_program = of_program.chain(Unfit::pairs(&old.name, &old.code, &new.code));
@@ -151,6 +173,7 @@ impl ChangeTexts {
                 before: before.agreement().configuration,
                 after: after.agreement().configuration,
                 programs,
+                fallbacks,
             })
         } else {
             Err(reasons)
@@ -162,15 +185,23 @@ impl ChangeTexts {
         ChangeName { before: self.before, after: self.after }
     }
 
+    /// The programs of which the text changes, or what their remote I/Os do, in the order of the cluster.
+    pub fn touched(&self) -> BTreeSet<ProgramId> {
+        let programs = self.programs.iter().map(|changed| changed.program);
+        programs.chain(self.fallbacks.iter().map(|changed| changed.program)).collect()
+    }
+
     /// The change back.
     #[must_use]
     pub fn back(self) -> Self {
-        let Self { cluster, before, after, programs } = self;
+        let Self { cluster, before, after, programs, fallbacks } = self;
         let programs = programs.into_iter().map(|changed| {
             let ChangedText { program, before, after } = changed;
             ChangedText { program, before: after, after: before }
         });
-        Self { cluster, before: after, after: before, programs: programs.collect() }
+        let (programs, (before, after)) = (programs.collect(), (after, before));
+        let fallbacks = fallbacks.into_iter().map(ChangedFallback::back).collect();
+        Self { cluster, before, after, programs, fallbacks }
     }
 
     /// What a member loads, whose cluster file is `cluster`: that before the change, or that after it.
@@ -222,22 +253,54 @@ impl ChangeTexts {
                 back: Arc::new(Between::new(&after, &before)),
             });
         }
-        let change = OnlineChange { before: self.before, after: self.after, programs };
-        for (side, claimed) in [(false, self.before), (true, self.after)] {
-            let text = text_with(cluster, &codes, side);
+        let fallbacks = self.load_fallbacks(cluster)?;
+        let change = OnlineChange { before: self.before, after: self.after, programs, fallbacks };
+        for (side, claimed) in [self.before, self.after].into_iter().enumerate() {
+            let code_of = |program| {
+                let found = codes.iter().find(|(of, _)| *of == program);
+                found.map(|(_, both): &(_, [Code; 2])| &both[side])
+            };
+            let text = text_with(cluster, code_of, |program| change.fallback_in(claimed, program));
             if ConfigurationHash::of(text.as_bytes()) != claimed {
                 return Err(ChangeError::NotItsResult { claimed });
             }
         }
         Ok(change)
     }
+
+    /// The settings of remote I/Os, before and after; those of the member's own configuration are those of its cluster file.
+    fn load_fallbacks(&self, cluster: &Cluster) -> Result<Vec<FallbackChange>, ChangeError> {
+        let is_before = cluster.agreement().configuration == self.before;
+        let read = |changed: &ChangedFallback| {
+            let program = changed.program;
+            let missing = ChangeError::NoSuchProgram { program };
+            let place = program.index();
+            let places = (cluster.controllers.get(place), cluster.remote_ios.get(place));
+            let (Some(controller), Some(remote_io)) = places else {
+                return Err(missing);
+            };
+            let outputs = &controller.interface.outputs;
+            let read = |text: &FallbackText| {
+                let fallback = text.read(outputs).filter(|fallback| {
+                    fallback.restart.is_some() == remote_io.fallback.restart.is_some()
+                });
+                fallback.ok_or_else(|| ChangeError::NoSettings { program: controller.name.clone() })
+            };
+            let (before, after) = (read(&changed.before)?, read(&changed.after)?);
+            if *if is_before { &before } else { &after } != remote_io.fallback {
+                return Err(ChangeError::OtherSettings { program: controller.name.clone() });
+            }
+            Ok(FallbackChange { program, before, after })
+        };
+        self.fallbacks.iter().map(read).collect()
+    }
 }
 
 impl Cluster {
-    /// The same cluster with the programs of one of the two configurations of a change, as if its file named them.
+    /// The same cluster with the programs and settings of one of the two configurations of a change, as if its file named them.
     ///
     /// # Errors
-    /// A text that is read as another program here.
+    /// A text that is read as another program here, and settings that are none of its program.
     pub fn changed(&self, texts: &ChangeTexts, to: ConfigurationHash) -> Result<Self, ChangeError> {
         let mut cluster = self.clone();
         let mut programs = cluster.programs.to_vec();
@@ -254,10 +317,20 @@ impl Cluster {
             programs[place] = Program { hash: text.hash, executable: code.executable() };
             controller.code = code;
         }
+        for changed in &texts.fallbacks {
+            let text = if to == texts.after { &changed.after } else { &changed.before };
+            let place = changed.program.index();
+            let missing = || ChangeError::NoSuchProgram { program: changed.program };
+            let controller = cluster.controllers.get(place).ok_or_else(missing)?;
+            let fallback = text.read(&controller.interface.outputs);
+            let unread = || ChangeError::NoSettings { program: controller.name.clone() };
+            cluster.remote_ios.get_mut(place).ok_or_else(missing)?.fallback =
+                fallback.ok_or_else(unread)?;
+        }
         // It was generated from the programs of the file.
         cluster.parity = cluster.parity.filter(|_| !is_changed);
         cluster.programs = programs.into();
-        cluster.canonical_text = text_with(&cluster, &[], false);
+        cluster.canonical_text = text_with(&cluster, |_| None, |_| None);
         let configuration = ConfigurationHash::of(cluster.canonical_text.as_bytes());
         cluster.agreement = Arc::new(Agreement { configuration, ..(*cluster.agreement).clone() });
         Ok(cluster)
@@ -275,51 +348,6 @@ impl ProgramText {
         let Self { hash, file, period, text, renamed } = self.clone();
         RetainedProgram { hash, file, period, text, inputs: Vec::new(), renamed }
     }
-}
-
-/// Why a member does not load an online change.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ChangeError {
-    /// It is one of another cluster.
-    #[error("the change is one of another cluster")]
-    OtherCluster,
-    /// The member runs neither configuration.
-    #[error("the change leads on from configuration {before}, and this member runs {own}")]
-    OtherConfiguration {
-        /// Configuration of the member.
-        own: ConfigurationHash,
-        /// Configuration that the change leads on from.
-        before: ConfigurationHash,
-    },
-    /// The cluster has no program in the place of one of the change.
-    #[error("the cluster has no program {}", .program.0)]
-    NoSuchProgram {
-        /// The program.
-        program: ProgramId,
-    },
-    /// The program of the change is another one than that of the cluster file.
-    #[error("the change is of another text of `{program}` than that which this member runs")]
-    OtherProgram {
-        /// Name of the controller.
-        program: String,
-    },
-    /// The texts do not make the configuration that they are said to make.
-    #[error(
-        "these texts do not make configuration {claimed} of the cluster file that this member runs"
-    )]
-    NotItsResult {
-        /// That configuration.
-        claimed: ConfigurationHash,
-    },
-    /// A text is not the program that its hash names.
-    #[error("`{file}` is read as another program here: this release differs from that of the tool")]
-    Unreadable {
-        /// File of the text.
-        file: String,
-    },
-    /// A program cannot be replaced while it runs.
-    #[error(transparent)]
-    Unfit(#[from] Unfit),
 }
 
 /// The way from one program to another one: by the names and types of its variables.
@@ -352,68 +380,20 @@ impl Conversion for Between {
     }
 }
 
-/// What becomes of each variable of a program in an online change.
-pub fn fates(before: &Code, after: &Code) -> Vec<CarriedPath> {
-    after.fates(before)
-}
-
-/// The pairs of a program that have done their work: the program before has the new name already.
-pub fn done_pairs(before: &Code, after: &Code) -> Vec<Renamed> {
-    let is_done = |pair: &&Renamed| before.typed().has_path(&pair.1);
-    after.source().renamed.iter().filter(is_done).cloned().collect()
-}
-
-/// An initial value that differs between two programs.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ChangedInitial {
-    /// The path.
-    pub path: String,
-    /// The two values, as they are written; nothing of what has parts.
-    pub values: Option<[String; 2]>,
-}
-
-/// Which of these paths, that go on with every value, begin with other ones in the program after: those count at its next start only.
-pub fn changed_initials(before: &Code, after: &Code, paths: &[CarriedPath]) -> Vec<ChangedInitial> {
-    let programs = [before, after].map(|code| code.typed());
-    let states = programs.map(|program| program.initial_state());
-    let goes_on = |path: &&CarriedPath| matches!(path.fate, Fate::Kept | Fate::Converted);
-    let changed = paths.iter().filter(goes_on).filter_map(|path| {
-        let was = path.renamed_from.as_ref().unwrap_or(&path.path);
-        let [old, new] = [programs[0].part(was), programs[1].part(&path.path)];
-        let parts = [old?, new?];
-        let values = [0, 1].map(|side: usize| {
-            let (_, stored) = parts[side].stored(&states[side])?;
-            Some(parts[side].declared()?.text(stored))
-        });
-        let [slots, others] = [0, 1].map(|side: usize| {
-            let first = (parts[side].address / 64) as usize;
-            states[side].get(first..first + parts[side].of.slots() as usize)
-        });
-        let values = match values {
-            [Some(one), Some(other)] => Some([one, other]),
-            _ => None,
-        };
-        let is_equal = match &values {
-            Some([one, other]) => one == other,
-            None => slots == others,
-        };
-        (!is_equal).then(|| ChangedInitial { path: path.path.clone(), values })
+/// The canonical text of a cluster in which these programs and settings stand in the place of its own.
+fn text_with<'a>(
+    cluster: &'a Cluster,
+    code_of: impl Fn(ProgramId) -> Option<&'a Code>,
+    fallback_of: impl Fn(ProgramId) -> Option<&'a Fallback>,
+) -> String {
+    let controllers = (0..).map(ProgramId).zip(cluster.controllers());
+    let codes = controllers
+        .map(|(program, controller)| code_of(program).unwrap_or(&controller.code).text());
+    let remote_ios = (0..).map(ProgramId).zip(cluster.remote_ios());
+    let fallbacks = remote_ios.map(|(program, remote_io)| {
+        fallback_text(fallback_of(program).unwrap_or(&remote_io.fallback))
     });
-    changed.collect()
-}
-
-/// The canonical text of a cluster in which these programs stand in the place of its own: those before the change, or those after it.
-fn text_with(cluster: &Cluster, codes: &[(ProgramId, [Code; 2])], is_after: bool) -> String {
-    let mut controllers = (0..).map(ProgramId).zip(cluster.controllers());
-    with_programs(&cluster.frame_text, || {
-        let Some((place, controller)) = controllers.next() else {
-            return String::new();
-        };
-        match codes.iter().find(|(program, _)| *program == place) {
-            Some((_, [before, after])) => if is_after { after } else { before }.text(),
-            None => controller.code.text(),
-        }
-    })
+    filled(&cluster.frame_text, codes, fallbacks)
 }
 
 #[cfg(test)]

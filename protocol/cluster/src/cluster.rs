@@ -20,11 +20,9 @@ use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{
-    Diagnosis, PairedInput, Ramp, Release, Restart, StaleState, StopPoints, ValueFault, Wiring,
-};
+use understudy_remote_io::{Diagnosis, Fallback, PairedInput, StopPoints, Wiring};
 use understudy_typed::{Points, Program as TypedProgram};
-use understudy_wire::{Image, Member, ProgramHash, ProgramId, ProgramSet, Roster, StationId};
+use understudy_wire::{Member, ProgramHash, ProgramId, ProgramSet, Roster, StationId};
 
 /// What carries the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -144,26 +142,12 @@ impl DiagnosisPlace {
 pub struct RemoteIo {
     /// Its name.
     pub name: String,
-    /// Cycles for which the last true outputs are kept when nothing true is there.
-    pub hold_cycles: u32,
-    /// Cycles after the switch of an online change in which a program fault takes the change back; never where it is 0.
-    pub trial_cycles: u32,
-    /// y(i) after that.
-    pub fail_safe: Image,
-    /// Numeric outputs that move to their fail-safe values by a ramp.
-    pub ramps: Vec<Ramp>,
-    /// Who releases the outputs after a cold start.
-    pub release: Release,
+    /// What it does where nothing is proved.
+    pub fallback: Fallback,
     /// Its inputs that do not come from the field.
     pub inputs: Vec<InputSource>,
     /// The equipment behind it; without one its plant is simulated, or absent.
     pub field: Option<FieldDevice>,
-    /// What is driven while nobody can say which of two stations is right.
-    pub value_fault: ValueFault,
-    /// What follows where living stations hold only states that are older than the newest applied output.
-    pub stale_state: StaleState,
-    /// How its program starts after a power failure, where that has retentive variables.
-    pub restart: Restart,
     /// What finds failed channels that do not say so.
     pub diagnosis: Option<DiagnosisPlace>,
     /// The second remote I/O of its program.
@@ -242,7 +226,7 @@ pub struct Cluster {
     pub(crate) security: Security,
     pub(crate) agreement: Arc<Agreement>,
     pub(crate) canonical_text: String,
-    /// The same without the programs: what an online change does not touch.
+    /// The same without the programs, and without what remote I/Os do where nothing is proved: what an online change does not touch.
     pub(crate) frame_text: String,
     pub(crate) controllers: Vec<Controller>,
     pub(crate) understudies: Vec<Understudy>,

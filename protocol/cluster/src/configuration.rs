@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use understudy_cycle::{Mode, Turns};
 use understudy_plant::{Followed, ModelKind, Signals};
-use understudy_remote_io::Wiring;
+use understudy_remote_io::{Fallback, Wiring};
 use understudy_wire::ProgramId;
 
 use crate::canonical::circuit_text;
@@ -18,11 +18,13 @@ use crate::source::{InputSource, InputSourceKind};
 /// Raised when equal texts would mean something else than before.
 const VERSION: u32 = 1;
 
-/// `plants` in the order of programs, from [`plant_text`]; empty where there is none. `program_text` says what of a program is in it.
+/// `plants` in the order of programs, from [`plant_text`]; empty where there is none. `program_text` says what of a program is in it, and `fallback`
+/// what of that which a remote I/O does where nothing is proved.
 pub(crate) fn configuration_text(
     cluster: &Cluster,
     plants: &[String],
     program_text: impl Fn(&Code) -> String,
+    fallback: impl Fn(&Fallback) -> String,
 ) -> String {
     let agreement = &cluster.agreement;
     let schedule = &agreement.schedule;
@@ -48,26 +50,13 @@ pub(crate) fn configuration_text(
     line(format_args!("shadow {}", agreement.shadow_cycles));
     line(format_args!("listen {}", agreement.listen_cycles));
     let remote_ios = cluster.remote_ios.iter().zip(&cluster.plants).zip(plants);
-    let programs = cluster.controllers.iter().zip(cluster.programs.iter());
-    for ((controller, program), ((remote_io, plant), plant_text)) in programs.zip(remote_ios) {
+    let controllers = cluster.controllers.iter();
+    for (controller, ((remote_io, plant), plant_text)) in controllers.zip(remote_ios) {
         line(format_args!("controller {}", controller.name));
         line(format_args!("{}", indented(&program_text(&controller.code))));
         line(format_args!("remote io {}", remote_io.name));
-        line(format_args!("  hold {}", remote_io.hold_cycles));
-        // As it was before there was a choice, so that such a cluster keeps its hash.
-        if remote_io.trial_cycles != TRIAL_CYCLES {
-            line(format_args!("  trial {}", remote_io.trial_cycles));
-        }
-        line(format_args!("  fail-safe {}", remote_io.fail_safe));
-        for ramp in &remote_io.ramps {
-            let bit = ramp.place.bit;
-            line(format_args!("  ramp {bit} {:016x}", ramp.step.to_bits()));
-        }
-        line(format_args!("  release {:?}", remote_io.release));
-        line(format_args!("  value fault {:?}", remote_io.value_fault));
-        line(format_args!("  stale state {:?}", remote_io.stale_state));
-        if program.executable.is_retentive() {
-            line(format_args!("  restart {:?}", remote_io.restart));
+        for setting in fallback(&remote_io.fallback).lines() {
+            line(format_args!("{setting}"));
         }
         if let Some(twin) = &remote_io.twin {
             let after = twin.take_over_after;
@@ -103,15 +92,58 @@ pub(crate) fn configuration_text(
     text
 }
 
+/// What a remote I/O does where nothing is proved, a line for each setting.
+pub(crate) fn fallback_text(fallback: &Fallback) -> String {
+    let Fallback {
+        hold_cycles,
+        trial_cycles,
+        fail_safe,
+        ramps,
+        release,
+        value_fault,
+        stale_state,
+        restart,
+    } = fallback;
+    let mut text = String::new();
+    let mut line = |line: std::fmt::Arguments<'_>| {
+        writeln!(text, "  {line}").expect("a string takes everything");
+    };
+    line(format_args!("hold {hold_cycles}"));
+    // As it was before there was a choice, so that such a cluster keeps its hash.
+    if *trial_cycles != TRIAL_CYCLES {
+        line(format_args!("trial {trial_cycles}"));
+    }
+    line(format_args!("fail-safe {fail_safe}"));
+    for ramp in ramps {
+        line(format_args!("ramp {} {:016x}", ramp.place.bit, ramp.step.to_bits()));
+    }
+    line(format_args!("release {release:?}"));
+    line(format_args!("value fault {value_fault:?}"));
+    line(format_args!("stale state {stale_state:?}"));
+    if let Some(restart) = restart {
+        line(format_args!("restart {restart:?}"));
+    }
+    text
+}
+
 /// What stands for a program in a text of which only the rest counts.
 pub(crate) const PROGRAM: &str = "the program";
 
-/// A text that has [`PROGRAM`] in the place of each program, with the programs that `next` gives one after another.
-pub(crate) fn with_programs(text: &str, mut next: impl FnMut() -> String) -> String {
+/// The line that stands for what a remote I/O does where nothing is proved.
+pub(crate) const FALLBACK: &str = "  what it does where nothing is proved";
+
+/// A text that has [`PROGRAM`] in the place of each program and [`FALLBACK`] in that of the settings of each remote I/O, with the programs and the
+/// settings that are given one after another.
+pub(crate) fn filled(
+    text: &str,
+    mut programs: impl Iterator<Item = String>,
+    mut fallbacks: impl Iterator<Item = String>,
+) -> String {
     let place = indented(PROGRAM);
-    let lines = text.lines().map(|line| {
-        let line = if line == place { indented(&next()) } else { line.to_owned() };
-        line + "\n"
+    let lines = text.lines().map(|line| match line {
+        _ if line == place => indented(&programs.next().unwrap_or_default()) + "\n",
+        FALLBACK => fallbacks.next().unwrap_or_default(),
+        _ => line.to_owned() + "\n",
     });
     lines.collect()
 }

@@ -104,7 +104,7 @@ macro_rules! keys {
 }
 
 /// Cycles in one number of the file, at most.
-const MANY_CYCLES: u32 = 100_000;
+pub(crate) const MANY_CYCLES: u32 = 100_000;
 
 /// Cycles after the switch of an online change in which a program fault takes it back, where the file does not say.
 pub(crate) const TRIAL_CYCLES: u32 = 100;

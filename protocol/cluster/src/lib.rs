@@ -37,8 +37,9 @@ pub use address::{
 };
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use change::{
-    ChangeError, ChangeTexts, ChangedInitial, ChangedSetting, ChangedText, NeedsStop,
-    OnlineChanges, PairReason, ProgramText, Unfit, changed_initials, done_pairs, fates,
+    ChangeError, ChangeTexts, ChangedFallback, ChangedInitial, ChangedSetting, ChangedText,
+    FallbackText, NeedsStop, OnlineChanges, PairReason, ProgramText, Unfit, changed_fallbacks,
+    changed_initials, done_pairs, fates,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Twin, Understudy};
 pub use code::{Code, Unnamed};

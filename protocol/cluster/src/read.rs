@@ -61,7 +61,7 @@ use understudy_cycle::Program;
 use understudy_cycle::{Agreement, Mode, Schedule, Turns};
 use understudy_executable::Interface;
 use understudy_logic::Circuit;
-use understudy_remote_io::{Release, Restart, StaleState, ValueFault};
+use understudy_remote_io::{Fallback, Release, Restart, StaleState, ValueFault};
 use understudy_text::{Diagnostic, Report};
 use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS, StationId, StationSet};
 
@@ -71,7 +71,7 @@ use self::names::Names;
 use crate::address::Addresses;
 use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
 use crate::code::Code;
-use crate::configuration::{PROGRAM, configuration_text};
+use crate::configuration::{FALLBACK, PROGRAM, configuration_text, fallback_text};
 use crate::file::{self, ClusterFile, ControllerSection};
 
 /// The longest cluster file in bytes.
@@ -167,7 +167,7 @@ fn build(
     let mut names = Names::new(link, cluster.multicast.is_some(), cluster.networks);
     let members = members(file.controllers, period, ladders, &mut names, diagnostics);
     let understudies = understudies(file.understudies, &mut names, diagnostics);
-    let remote_ios =
+    let mut remote_ios =
         remote_ios(file.remote_ios, period, &members, ladders, &mut names, diagnostics);
     let simulated: Vec<_> =
         file.plants.iter().filter_map(|plant| plant.controller.clone()).collect();
@@ -206,13 +206,17 @@ fn build(
             return None;
         }
     };
-    let programs = controllers
+    let programs: Arc<[Program]> = controllers
         .iter()
         .map(|controller| Program {
             hash: controller.hash,
             executable: controller.code.executable(),
         })
         .collect();
+    for (remote_io, program) in remote_ios.iter_mut().zip(programs.iter()) {
+        let restart = &mut remote_io.fallback.restart;
+        *restart = restart.filter(|_| program.executable.is_retentive());
+    }
     let agreement = Agreement {
         cluster: ClusterHash::of(name.as_bytes()),
         configuration: ConfigurationHash::default(),
@@ -246,8 +250,10 @@ fn build(
         programs,
         parity,
     };
-    cluster.canonical_text = configuration_text(&cluster, &plants.texts, Code::text);
-    cluster.frame_text = configuration_text(&cluster, &plants.texts, |_| PROGRAM.to_owned());
+    cluster.canonical_text = configuration_text(&cluster, &plants.texts, Code::text, fallback_text);
+    let program = |_: &Code| PROGRAM.to_owned();
+    cluster.frame_text =
+        configuration_text(&cluster, &plants.texts, program, |_| FALLBACK.to_owned() + "\n");
     let configuration = ConfigurationHash::of(cluster.canonical_text.as_bytes());
     cluster.agreement = Arc::new(Agreement { configuration, ..agreement });
     Some(cluster)
@@ -365,11 +371,17 @@ fn remote_ios(
                 names.declare(&name, controller.span.clone(), diagnostics);
                 name
             }),
-            hold_cycles: section.hold_cycles,
-            trial_cycles: section.trial_cycles,
-            fail_safe,
-            ramps,
-            release: [Release::Automatic, Release::Operator][section.release],
+            fallback: Fallback {
+                hold_cycles: section.hold_cycles,
+                trial_cycles: section.trial_cycles,
+                fail_safe,
+                ramps,
+                release: [Release::Automatic, Release::Operator][section.release],
+                value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
+                    [section.value_fault],
+                stale_state: [StaleState::Operator, StaleState::Cold][section.stale_state],
+                restart: Some([Restart::Warm, Restart::Cold, Restart::Operator][section.restart]),
+            },
             inputs: inputs::resolve(
                 &section.inputs,
                 index,
@@ -381,10 +393,6 @@ fn remote_ios(
             field: section.field.as_ref().and_then(|field| {
                 devices::device(field, &section.inputs, &read, member, diagnostics)
             }),
-            value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
-                [section.value_fault],
-            stale_state: [StaleState::Operator, StaleState::Cold][section.stale_state],
-            restart: [Restart::Warm, Restart::Cold, Restart::Operator][section.restart],
             diagnosis: section
                 .diagnosis
                 .as_ref()
@@ -411,16 +419,18 @@ fn remote_ios(
             }
             RemoteIo {
                 name,
-                hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
-                trial_cycles: crate::format::REMOTE_IO.default_count("trial_cycles"),
-                fail_safe: fail_safe::values(member, &[], diagnostics),
-                ramps: Vec::new(),
-                release: Release::default(),
+                fallback: Fallback {
+                    hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
+                    trial_cycles: crate::format::REMOTE_IO.default_count("trial_cycles"),
+                    fail_safe: fail_safe::values(member, &[], diagnostics),
+                    ramps: Vec::new(),
+                    release: Release::default(),
+                    value_fault: ValueFault::default(),
+                    stale_state: StaleState::default(),
+                    restart: Some(Restart::default()),
+                },
                 inputs: Vec::new(),
                 field: None,
-                value_fault: ValueFault::default(),
-                stale_state: StaleState::default(),
-                restart: Restart::default(),
                 diagnosis: None,
                 twin: None,
                 addresses: Addresses::default(),

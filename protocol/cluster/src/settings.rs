@@ -61,17 +61,7 @@ impl Cluster {
             ),
             stop: controller.stop_points(),
             diagnosis: remote_io.diagnosis.as_ref().map(|it| Arc::clone(&it.compiled)),
-            hold_cycles: remote_io.hold_cycles,
-            trial_cycles: remote_io.trial_cycles,
-            fail_safe: remote_io.fail_safe.clone(),
-            ramps: remote_io.ramps.clone(),
-            release: remote_io.release,
-            value_fault: remote_io.value_fault,
-            stale_state: remote_io.stale_state,
-            restart: self.programs[program.index()]
-                .executable
-                .is_retentive()
-                .then_some(remote_io.restart),
+            fallback: remote_io.fallback.clone(),
             pair: remote_io.twin.as_ref().map(|twin| PairSettings {
                 wiring: twin.wiring,
                 ..PairSettings::exclusive(twin.take_over_after)
@@ -110,7 +100,7 @@ impl Cluster {
         let place = self.plants.get(program.index())?.as_ref()?;
         let remote_io = &self.remote_ios[program.index()];
         let has_two_modules = remote_io.twin.as_ref().is_some_and(Twin::is_parallel);
-        let fail_safe = &remote_io.fail_safe;
+        let fail_safe = &remote_io.fallback.fail_safe;
         Some(understudy_plant::Settings {
             program,
             agreement: Arc::clone(&self.agreement),

@@ -19,6 +19,8 @@ use understudy_wire::{
     ChangeName, ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId,
 };
 
+use crate::fallback::Fallback;
+
 /// Compiled program of the cluster.
 #[derive(Debug, Clone)]
 pub struct Program {
@@ -53,6 +55,17 @@ pub struct ProgramChange {
     pub back: Arc<dyn Conversion>,
 }
 
+/// What an online change replaces of the settings of one remote I/O. They count where that configuration is its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FallbackChange {
+    /// Its program.
+    pub program: ProgramId,
+    /// The settings of the configuration before.
+    pub before: Fallback,
+    /// The settings of the configuration after.
+    pub after: Fallback,
+}
+
 /// What an online change replaces. Everything else of the two configurations is equal.
 #[derive(Debug, Clone)]
 pub struct OnlineChange {
@@ -62,6 +75,8 @@ pub struct OnlineChange {
     pub after: ConfigurationHash,
     /// The programs that it replaces, in the order of the cluster.
     pub programs: Vec<ProgramChange>,
+    /// The settings that it replaces, in the order of the cluster.
+    pub fallbacks: Vec<FallbackChange>,
 }
 
 impl OnlineChange {
@@ -82,6 +97,16 @@ impl OnlineChange {
         program: ProgramId,
     ) -> Option<&Program> {
         let of = self.of(program)?;
+        Some(if configuration == self.after { &of.after } else { &of.before })
+    }
+
+    /// The settings of a remote I/O in one of the two configurations; none where the change does not replace them.
+    pub fn fallback_in(
+        &self,
+        configuration: ConfigurationHash,
+        program: ProgramId,
+    ) -> Option<&Fallback> {
+        let of = self.fallbacks.iter().find(|change| change.program == program)?;
         Some(if configuration == self.after { &of.after } else { &of.before })
     }
 }
@@ -253,7 +278,7 @@ mod tests {
     const THREE: ConfigurationHash = ConfigurationHash(3);
 
     fn change(before: ConfigurationHash, after: ConfigurationHash) -> OnlineChange {
-        OnlineChange { before, after, programs: Vec::new() }
+        OnlineChange { before, after, programs: Vec::new(), fallbacks: Vec::new() }
     }
 
     /// An engineer ends the change from 1 to 2 once more while the one from 2 to 3 is prepared, or accepted: nothing of the latter changes.

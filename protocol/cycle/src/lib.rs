@@ -10,8 +10,11 @@ mod attendance;
 mod change;
 mod clock;
 mod copies;
+mod fallback;
 mod machine;
 mod participant;
+mod place;
+mod ramp;
 mod reception;
 mod schedule;
 pub mod spare;
@@ -20,10 +23,14 @@ mod waking;
 pub use agreement::{Agreement, Mode};
 pub use attendance::{Attendance, Change};
 pub use change::{
-    ChangeOrder, Changing, Conversion, OnlineChange, Program, ProgramChange, Versions,
+    ChangeOrder, Changing, Conversion, FallbackChange, OnlineChange, Program, ProgramChange,
+    Versions,
 };
 pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
+pub use fallback::{Fallback, Release, Restart, StaleState, ValueFault};
 pub use machine::{Input, Machine, Output, Outvoted, RemoteIoInput};
 pub use participant::{Endpoint, Notice, Participant, Refusal};
+pub use place::{PointPlace, in_order};
+pub use ramp::{Descent, Ramp};
 pub use schedule::{Schedule, ScheduleError, Turns};

@@ -63,6 +63,8 @@ pub enum Output<Event> {
     Follow(Image),
     /// Whether the remote I/O is to be connected to its field; one that has no second one is from its start on.
     Connect(bool),
+    /// Outputs that the device of a remote I/O is left with where the process ends in order; until the first of these, those that it was started with.
+    EndWith(Image),
     /// An event for the journal.
     Report(Event),
     /// A record for the disk, for the time after a power failure.

@@ -142,6 +142,11 @@ impl<Event: From<Refusal>> Endpoint<Event> {
         }
     }
 
+    /// What it knows of an online change.
+    pub fn changing(&self) -> &Changing {
+        &self.changing
+    }
+
     /// Its configuration, and the one that it has loaded beside it.
     pub fn configurations(&self) -> Configurations {
         self.changing.configurations()

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::{ChangeOrder, OnlineChange, Output};
+use understudy_cycle::{ChangeOrder, Descent, OnlineChange, Output};
 use understudy_wire::{
     ChangeName, ConfigurationHash, Configurations, Header, Holding, OrderRefusal, ProgramHash,
-    StationId, StationSet, Time,
+    Source, StationId, StationSet, Time,
 };
 
 use super::{Execution, RemoteIo};
@@ -76,12 +76,15 @@ impl Replacing {
 
 impl RemoteIo {
     /// It had loaded a change before it was started, with these configurations; before [`Self::noting`]. Without effect where the change is not of
-    /// its configuration.
+    /// its configuration. It begins with the settings of the configuration that it had.
     #[must_use]
     pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
         let restored = self.member.restore_change(Arc::clone(change), configurations);
-        if restored.is_ok() && configurations.prepared.is_none() {
-            self.adopt(change, configurations.own);
+        if restored.is_ok() {
+            self.take_fallback(change, configurations.own);
+            if configurations.prepared.is_none() {
+                self.adopt(change, configurations.own);
+            }
         }
         self
     }
@@ -156,8 +159,12 @@ impl RemoteIo {
         let before = self.member.changing().change().cloned();
         self.member.take_change(now, order, may_forget);
         let changing = self.member.changing();
-        if let (Some(change), None) = (before, changing.change()) {
-            let own = changing.configurations().own;
+        let own = changing.configurations().own;
+        let (after, is_over) = (changing.change().cloned(), changing.change().is_none());
+        if let Some(change) = after.or(before.clone()) {
+            self.take_fallback(&change, own);
+        }
+        if let (Some(change), true) = (before, is_over) {
             self.adopt(&change, own);
             self.replacing = Replacing::default();
         }
@@ -198,7 +205,9 @@ impl RemoteIo {
 
     /// Whether a program that a change mark brings is on trial. What the program of its own configuration does is no matter of the change.
     fn is_tried(&self, program: ProgramHash) -> bool {
-        program != self.hash() && self.settings.stop.is_some() && self.settings.trial_cycles > 0
+        program != self.hash()
+            && self.settings.stop.is_some()
+            && self.settings.fallback.trial_cycles > 0
     }
 
     /// A sample was taken, for the program `change` where that is another one than `from`.
@@ -206,7 +215,7 @@ impl RemoteIo {
         let Some(to) = change else {
             return self.replacing.sampled();
         };
-        let left = self.settings.trial_cycles;
+        let left = self.settings.fallback.trial_cycles;
         let is_tried = self.program == Execution::Running && self.is_tried(to);
         if let Some(from) = from.filter(|_| is_tried) {
             self.replacing.trial = Trial::Running { from, left, runs: self.missed == 0 };
@@ -244,6 +253,26 @@ impl RemoteIo {
     pub(super) fn adopt(&mut self, change: &OnlineChange, own: ConfigurationHash) {
         if let Some(program) = change.program_in(own, self.settings.program) {
             self.settings.hash = program.hash;
+        }
+    }
+
+    /// Takes the settings of its own configuration, one of those of a change. Outputs that are fail-safe go on from where they are: along the new
+    /// ramps, to the new values.
+    fn take_fallback(&mut self, change: &OnlineChange, own: ConfigurationHash) {
+        let changed = change.fallback_in(own, self.settings.program);
+        let Some(fallback) = changed.filter(|changed| **changed != self.settings.fallback) else {
+            return;
+        };
+        let applied = self.applied.as_ref().filter(|it| it.source == Source::FailSafe);
+        if let Some(applied) = applied.filter(|_| !fallback.ramps.is_empty()) {
+            self.descent = Some(Descent::new(applied.outputs.clone()));
+        } else {
+            self.descent = None;
+        }
+        self.settings.fallback = fallback.clone();
+        // Modules next to those of the other one are released at the end.
+        if !self.has_own_modules() {
+            self.member.put(Output::EndWith(fallback.fail_safe.clone()));
         }
     }
 

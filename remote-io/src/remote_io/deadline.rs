@@ -1,15 +1,13 @@
 //! The deadline: something is driven at every one, and only what is true, held, or fail-safe.
 
-use understudy_cycle::Output;
+use understudy_cycle::{Descent, Output, ValueFault};
 use understudy_wire::{Image, Moment, Source, StationSet, Time};
 
 use super::knowledge::Run;
 use super::{Applied, Authority, Deadline, Execution, Question, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
-use crate::ramp::Descent;
 use crate::selection::{Received, Selection};
-use crate::settings::ValueFault;
 use crate::trust::Accusation;
 
 impl RemoteIo {
@@ -24,7 +22,7 @@ impl RemoteIo {
             mode: self.settings.agreement.mode,
         };
         let settings = &self.settings;
-        let width = settings.fail_safe.width();
+        let width = settings.fallback.fail_safe.width();
         let mut accusation = None;
         let (selection, sampled) = match self.knowledge.run() {
             None => (Selection::Missing(Missing::NoHistory), None),
@@ -37,7 +35,7 @@ impl RemoteIo {
                 (Selection::Missing(Missing::TooLate), Some(sampled))
             }
             Some(Run { history, .. }) => {
-                let (truth, answer) = (history.head(), settings.value_fault);
+                let (truth, answer) = (history.head(), settings.fallback.value_fault);
                 let (selected, found) =
                     received.select(settings.program, truth, width, &mut self.trust, answer);
                 accusation = found;
@@ -55,12 +53,12 @@ impl RemoteIo {
                 moment,
                 accused,
                 located,
-                answer: self.settings.value_fault,
+                answer: self.settings.fallback.value_fault,
             });
         }
         self.report_differences(moment);
         let doubted = matches!(selection, Selection::Missing(Missing::ValueFault));
-        if doubted && self.settings.value_fault == ValueFault::FailSafe {
+        if doubted && self.settings.fallback.value_fault == ValueFault::FailSafe {
             self.authority = Authority::Operator;
             self.last_true = None;
         }
@@ -86,7 +84,7 @@ impl RemoteIo {
     /// Fewer missed deadlines are counted by the frames of their cycles, which have waited meanwhile.
     pub(super) fn note_lateness(&mut self, now: Time) {
         let passed = self.periods_late(now);
-        if passed >= self.settings.hold_cycles {
+        if passed >= self.settings.fallback.hold_cycles {
             self.missed = self.missed.max(passed);
         }
     }
@@ -167,7 +165,7 @@ impl RemoteIo {
                 };
                 self.missed = self.missed.saturating_add(1);
                 let held = self.last_true.clone();
-                match held.filter(|_| self.missed <= self.settings.hold_cycles) {
+                match held.filter(|_| self.missed <= self.settings.fallback.hold_cycles) {
                     Some(outputs) => (outputs, Source::Held, None, Some(missing)),
                     None => {
                         self.last_true = None;
@@ -211,7 +209,7 @@ impl RemoteIo {
 
     /// The fail-safe values, or the next outputs on the way to them.
     fn descend(&mut self) -> Image {
-        let (fail_safe, ramps) = (&self.settings.fail_safe, &self.settings.ramps);
+        let (fail_safe, ramps) = (&self.settings.fallback.fail_safe, &self.settings.fallback.ramps);
         match &self.applied {
             Some(applied) if applied.source != Source::FailSafe && !ramps.is_empty() => {
                 self.descent = Some(Descent::new(applied.outputs.clone()));

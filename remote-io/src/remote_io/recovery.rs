@@ -13,6 +13,7 @@
 //!   covers it after a restart ──────────────────────────── the state is lost: see `StaleState`
 //! ```
 
+use understudy_cycle::{Release, Restart, StaleState};
 use understudy_wire::{
     Holding, Kept, Moment, OrderRefusal, StateChoice, StationId, StationSet, Time,
 };
@@ -21,7 +22,6 @@ use super::knowledge::{Floor, Knowledge, Run};
 use super::{Authority, Question, RemoteIo};
 use crate::event::Event;
 use crate::history::History;
-use crate::settings::{Release, Restart, StaleState};
 use crate::trust::Trust;
 
 /// What the states of the living stations allow.
@@ -197,8 +197,8 @@ impl RemoteIo {
         }
         let applied = self.newest_applied().or_else(|| self.applied_of_another());
         let asks = self.asks_for_lost_state()
-            || self.settings.stale_state == StaleState::Operator
-            || self.settings.restart == Some(Restart::Operator)
+            || self.settings.fallback.stale_state == StaleState::Operator
+            || self.settings.fallback.restart == Some(Restart::Operator)
             || self.may_have_the_wrong_program();
         let reason = self.reason_to_ask();
         // Stations that hold a state recall the inputs of its last sample.
@@ -217,7 +217,8 @@ impl RemoteIo {
         let moment = self.moment();
         let held = self.holders.newest().map(|(from, newest)| (from, *newest));
         let retained = self.newest_retained().map(|(from, kept)| (from, *kept));
-        let retained = retained.filter(|_| held.is_none() && self.settings.restart.is_some());
+        let retained =
+            retained.filter(|_| held.is_none() && self.settings.fallback.restart.is_some());
         let newest = held.or(retained.map(|(from, kept)| (from, kept.holding)));
         match (self.question, choice, newest) {
             (
@@ -260,7 +261,7 @@ impl RemoteIo {
         let capacity = self.settings.agreement.history;
         let sent = self.pairing.as_ref().and_then(|pairing| pairing.received());
         // Proven outputs that the other remote I/O was not allowed to drive are not released by its failure.
-        if self.settings.release == Release::Operator {
+        if self.settings.fallback.release == Release::Operator {
             let drives = match sent {
                 Some(sample) => sample.drives,
                 None => self.was_released(from, &holding),
@@ -287,7 +288,7 @@ impl RemoteIo {
 
     /// Starts to sample from the initial state; with the newest applied output, where the state that it came from is lost and no person has chosen so.
     fn start_cold(&mut self, moment: Moment, lost: Option<Moment>) {
-        let awaits_release = self.settings.release == Release::Operator;
+        let awaits_release = self.settings.fallback.release == Release::Operator;
         self.authority = if awaits_release { Authority::Operator } else { Authority::Proof };
         self.last_true = None;
         self.report(Event::StartedCold { born: moment, awaits_release, lost });

@@ -14,7 +14,8 @@ impl RemoteIo {
         let mut unsteady = None;
         if let Some(diagnosis) = &self.settings.diagnosis {
             let applied = self.applied.as_ref();
-            let outputs = applied.map_or(&self.settings.fail_safe, |applied| &applied.outputs);
+            let outputs =
+                applied.map_or(&self.settings.fallback.fail_safe, |applied| &applied.outputs);
             let observation = Observation {
                 sensors: &shown,
                 driven: &self.forcing.outputs(outputs),

@@ -10,12 +10,13 @@
 //! sample.
 
 use smallvec::SmallVec;
+use understudy_cycle::ValueFault;
 use understudy_wire::{Image, Lineage, Moment, ProgramId, Sample, StationSet};
 
 use super::RemoteIo;
 use crate::event::Event;
 use crate::selection::{Received, Selection};
-use crate::settings::{Settings, ValueFault};
+use crate::settings::Settings;
 use crate::source::{SignalInput, SignalSource};
 use crate::trust::Trust;
 

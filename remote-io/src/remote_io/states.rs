@@ -6,7 +6,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
+use understudy_cycle::{
+    Agreement, Fallback, Input, Machine, Mode, Output, PointPlace, Release, RemoteIoInput,
+    Schedule, StaleState, ValueFault,
+};
 use understudy_testing::states::Table;
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
@@ -16,7 +19,7 @@ use understudy_wire::{
 
 use super::knowledge::Knowledge;
 use super::{Authority, Question, RemoteIo};
-use crate::settings::{Release, Settings, StaleState, ValueFault};
+use crate::settings::Settings;
 
 const PERIOD: Duration = Duration::from_millis(10);
 const PROGRAM: ProgramId = ProgramId(0);
@@ -87,22 +90,24 @@ impl Bench {
             agreement: Arc::new(agreement),
             hash: ProgramHash(1),
             undriven: Image::zero(1),
-            input_points: crate::source::PointPlace::booleans(1),
-            output_points: crate::source::PointPlace::booleans(1),
+            input_points: PointPlace::booleans(1),
+            output_points: PointPlace::booleans(1),
             operator_inputs: Vec::new(),
             signals: Vec::new(),
             signal_sources: Vec::new(),
             channels: Vec::new(),
             stop: None,
             diagnosis: None,
-            hold_cycles: 2,
-            trial_cycles: 0,
-            fail_safe: Image::zero(1),
-            ramps: Vec::new(),
-            release: Release::Operator,
-            value_fault: ValueFault::FailSafe,
-            stale_state: StaleState::Operator,
-            restart: None,
+            fallback: Fallback {
+                hold_cycles: 2,
+                trial_cycles: 0,
+                fail_safe: Image::zero(1),
+                ramps: Vec::new(),
+                release: Release::Operator,
+                value_fault: ValueFault::FailSafe,
+                stale_state: StaleState::Operator,
+                restart: None,
+            },
             pair: None,
             paired_inputs: Vec::new(),
         };

@@ -15,7 +15,7 @@
 //! The history of a warm start begins with a lineage that names the retained state, so a station that has this state follows
 //! it without being asked, and any other one takes a state over as always.
 
-use understudy_cycle::Output;
+use understudy_cycle::{Output, Release, Restart};
 use understudy_wire::{
     Configurations, Image, Kept, Lineage, Moment, Note, ProgramHash, Recalled, Retained,
     SamplesReceived, StationId, StationSet,
@@ -25,7 +25,6 @@ use super::recovery::Verdict;
 use super::{Authority, Knowledge, RemoteIo};
 use crate::event::{AskReason, Event, OldInputs};
 use crate::history::History;
-use crate::settings::{Release, Restart};
 
 /// What a remote I/O notes on disk, and what it has found there.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
@@ -123,7 +122,7 @@ impl RemoteIo {
     pub(super) fn lost_by_cold_start(&self) -> Option<Moment> {
         let floor = self.knowledge.floor().map(|floor| floor.moment);
         // Where a cold start is configured, it is what was asked for.
-        let keeps = self.settings.restart.is_some_and(|restart| restart != Restart::Cold);
+        let keeps = self.settings.fallback.restart.is_some_and(|restart| restart != Restart::Cold);
         floor.or(self.newest_applied().filter(|_| keeps))
     }
 
@@ -144,7 +143,7 @@ impl RemoteIo {
             cluster: agreement.cluster,
             configuration: self.member.changing().configurations().own,
             hash: self.running().unwrap_or(self.hash()),
-            is_retentive: self.settings.restart.is_some(),
+            is_retentive: self.settings.fallback.restart.is_some(),
             number: self.noting.number,
             lineage: after,
             begun: None,
@@ -234,7 +233,7 @@ impl RemoteIo {
 
     /// What the retained states of the stations allow, where no living station holds a state.
     pub(super) fn warm_verdict(&self) -> Verdict {
-        let Some(restart) = self.settings.restart else {
+        let Some(restart) = self.settings.fallback.restart else {
             // What the program before has kept is not given up without a question.
             let was_retentive = self.noting.found.as_ref().is_some_and(|note| note.is_retentive);
             let may_lose = self.noting.is_damaged || was_retentive;
@@ -263,7 +262,7 @@ impl RemoteIo {
     /// Why the program does not go on by itself from the newest state that stations hold or have kept.
     pub(super) fn reason_to_ask(&self) -> AskReason {
         let retained = self.newest_retained().filter(|_| self.holders.newest().is_none());
-        match (retained, self.settings.restart) {
+        match (retained, self.settings.fallback.restart) {
             (Some((_, kept)), _) if !kept.is_whole => AskReason::NotWhole,
             (Some((_, kept)), Some(Restart::Operator)) if !self.is_before_applied(kept) => {
                 AskReason::Configured
@@ -302,7 +301,7 @@ impl RemoteIo {
 
     /// Starts to sample from the initial state with the retentive values of a retained one.
     pub(super) fn start_warm(&mut self, moment: Moment, (from, kept): (StationId, Kept)) {
-        let awaits_release = self.settings.release == Release::Operator;
+        let awaits_release = self.settings.fallback.release == Release::Operator;
         self.authority = if awaits_release { Authority::Operator } else { Authority::Proof };
         self.last_true = None;
         let applied = self.newest_applied_of(kept.of).map(|(applied, _)| applied);

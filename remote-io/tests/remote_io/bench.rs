@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
 use understudy_remote_io::{
-    Event, PointPlace, Release, RemoteIo, Settings, StaleState, ValueFault,
+    Event, Fallback, PointPlace, Release, RemoteIo, Settings, StaleState, ValueFault,
 };
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
@@ -46,17 +46,25 @@ pub(crate) fn settings(understudies: usize) -> Settings {
         channels: Vec::new(),
         stop: None,
         diagnosis: None,
-        hold_cycles: 3,
-        trial_cycles: 0,
-        fail_safe: Image::zero(1),
-        ramps: Vec::new(),
-        release: Release::Automatic,
-        value_fault: ValueFault::Hold,
-        stale_state: StaleState::Operator,
-        restart: None,
+        fallback: Fallback {
+            hold_cycles: 3,
+            trial_cycles: 0,
+            fail_safe: Image::zero(1),
+            ramps: Vec::new(),
+            release: Release::Automatic,
+            value_fault: ValueFault::Hold,
+            stale_state: StaleState::Operator,
+            restart: None,
+        },
         pair: None,
         paired_inputs: Vec::new(),
     }
+}
+
+/// The same, with who releases the outputs after a cold start.
+pub(crate) fn releasing(mut settings: Settings, release: Release) -> Settings {
+    settings.fallback.release = release;
+    settings
 }
 
 /// A remote I/O and the cycle that it is in.

@@ -1,7 +1,7 @@
 //! A start after the program has changed while the power was off: when the values that stations have taken over may be used without a question.
 
 use understudy_cycle::{Output, RemoteIoInput};
-use understudy_remote_io::{Event, Restart, Settings};
+use understudy_remote_io::{Event, Restart};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Holding, Image, Kept, Lineage,
     Moment, Note, ProgramHash, Recalled, SamplesReceived, StateChoice, StationId, StationSet,
@@ -72,7 +72,8 @@ fn run_with(
     kept: [Option<Kept>; 2],
     choice: Option<StateChoice>,
 ) -> Vec<Event> {
-    let settings = Settings { restart, ..settings(1) };
+    let mut settings = settings(1);
+    settings.fallback.restart = restart;
     let mut bench = Bench::new(settings, 1000);
     bench.epoch = 2;
     bench.remote_io = bench.remote_io.noting(found, is_damaged);

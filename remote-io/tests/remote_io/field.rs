@@ -2,7 +2,7 @@
 
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, Missing, OperatorInput, OperatorInputKind, PointPlace, Settings,
+    Event, Fallback, Missing, OperatorInput, OperatorInputKind, PointPlace, Settings,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
@@ -122,7 +122,7 @@ fn a_force_is_of_a_whole_signal_and_of_a_value_that_it_can_have() {
         undriven: Image::zero(128),
         input_points: points.clone(),
         output_points: points.clone(),
-        fail_safe: Image::zero(128),
+        fallback: Fallback { fail_safe: Image::zero(128), ..settings(1).fallback },
         ..settings(1)
     };
     let mut bench = bench(settings);

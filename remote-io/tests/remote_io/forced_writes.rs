@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use understudy_cycle::{Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, OperatorInput, OperatorInputKind, PointPlace, RemoteIo, Settings,
+    Event, Fallback, OperatorInput, OperatorInputKind, PointPlace, RemoteIo, Settings,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
@@ -113,7 +113,7 @@ impl Operated {
                 retains: false,
             }],
             // Writes are taken while outputs are held.
-            hold_cycles: 1000,
+            fallback: Fallback { hold_cycles: 1000, ..settings(1).fallback },
             ..settings(1)
         };
         let mut bench = Self {

@@ -7,3 +7,4 @@ mod forced_writes;
 mod gone;
 mod pair;
 mod restart;
+mod switching;

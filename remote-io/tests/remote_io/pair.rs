@@ -7,12 +7,14 @@ use understudy_wire::{
     Sample, Source, StationSet, Step, Turn,
 };
 
-use crate::bench::{Bench, PROGRAM, Said, held_after, recalled_of, sample_of, settings, turn};
+use crate::bench::{
+    Bench, PROGRAM, Said, held_after, recalled_of, releasing, sample_of, settings, turn,
+};
 
 /// The twin of a program with a controller and an understudy.
 fn twin(release: Release) -> Settings {
     let pair = PairSettings { is_twin: true, ..PairSettings::exclusive(1) };
-    Settings { pair: Some(pair), release, ..settings(1) }
+    Settings { pair: Some(pair), ..releasing(settings(1), release) }
 }
 
 /// The sample of the author in the cycle of `bench`, after `before`.

@@ -7,7 +7,9 @@ use understudy_wire::{
     SignalPlace, Source, StationId, StationSet,
 };
 
-use crate::bench::{Bench, PROGRAM, held_after, join, recalled_of, sample_of, settings, turn};
+use crate::bench::{
+    Bench, PROGRAM, held_after, join, recalled_of, releasing, sample_of, settings, turn,
+};
 
 fn moment(cycle: u64) -> Moment {
     Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
@@ -19,7 +21,7 @@ type Held = Option<(u64, u64)>;
 /// The only program's controller and two understudies ask to join in each cycle, and say what they hold; the operator releases the
 /// outputs after `released_at` cycles. Answers with what was reported, and every source of an output.
 fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<Event> {
-    let mut bench = Bench::new(Settings { release, ..settings(2) }, 100);
+    let mut bench = Bench::new(releasing(settings(2), release), 100);
     let mut said = Vec::new();
     for cycle in 0..cycles {
         bench.cycle = 100 + cycle;

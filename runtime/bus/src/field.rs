@@ -21,6 +21,11 @@ pub trait FieldDriver: Send {
         let _ = connects;
     }
 
+    /// What the outputs are left with where this process ends in order, from now on.
+    fn end_with(&mut self, outputs: &Image) {
+        let _ = outputs;
+    }
+
     /// u(i), where `frame` comes from this field.
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
 

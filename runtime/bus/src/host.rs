@@ -409,6 +409,7 @@ impl<M: Machine> Host<'_, M> {
                     }
                 }
                 Output::Connect(connects) => self.field.connect(connects),
+                Output::EndWith(outputs) => self.field.end_with(&outputs),
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
                 Output::Retain(record) => {
                     if let Some(retainer) = &self.retainer {

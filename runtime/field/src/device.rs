@@ -92,6 +92,8 @@ struct State {
     contested: bool,
     /// Whether a connection is wanted: of two remote I/Os of a program, by the author only.
     connected: bool,
+    /// What it is left with; nothing of one of two remote I/Os, since the other one continues.
+    fail_safe: Option<Image>,
     ending: bool,
 }
 
@@ -129,7 +131,8 @@ impl Device {
         period: Duration,
         real_time: bool,
     ) -> std::io::Result<Self> {
-        let connected = fail_safe.is_some();
+        let in_pair = fail_safe.is_none();
+        let connected = !in_pair;
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
                 number: 1,
@@ -138,6 +141,7 @@ impl Device {
                 outputs: None,
                 contested: false,
                 connected,
+                fail_safe,
                 ending: false,
             }),
             changed: Notify::new(),
@@ -152,7 +156,7 @@ impl Device {
                     inputs: Plan::new(&settings.inputs),
                     outputs: Plan::new(&settings.outputs),
                     settings,
-                    fail_safe,
+                    in_pair,
                     period,
                     unread: Cell::new(0),
                     shared: worker,
@@ -177,6 +181,13 @@ impl Device {
         let decided_at = now.checked_sub(age).unwrap_or(now);
         self.shared.lock().outputs = Some((outputs.clone(), decided_at));
         self.shared.changed.notify_one();
+    }
+
+    /// What the device is left with at the end, from now on; without effect for one of two remote I/Os of a program.
+    pub fn end_with(&self, outputs: &Image) {
+        if let Some(fail_safe) = &mut self.shared.lock().fail_safe {
+            fail_safe.clone_from(outputs);
+        }
     }
 
     /// Connects to the device, or ends the connection without another request.
@@ -271,8 +282,8 @@ struct Worker {
     settings: FieldDevice,
     inputs: Plan,
     outputs: Plan,
-    /// What the device is driven to in the end; nothing of one of two remote I/Os.
-    fail_safe: Option<Image>,
+    /// Whether the remote I/O is one of two of its program.
+    in_pair: bool,
     period: Duration,
     /// How often in a row its outputs could not be read; [`UNREAD`] where it does not let them be read.
     unread: Cell<u8>,
@@ -310,11 +321,11 @@ impl Worker {
 
     /// One of two remote I/Os tries at each cycle: the device lets it write when the other one's connection is over.
     fn first_pause(&self) -> Duration {
-        if self.fail_safe.is_some() { FIRST_PAUSE } else { self.period.min(FIRST_PAUSE) }
+        if self.in_pair { self.period.min(FIRST_PAUSE) } else { FIRST_PAUSE }
     }
 
     fn longest_pause(&self) -> Duration {
-        if self.fail_safe.is_some() { LONGEST_PAUSE } else { self.first_pause() }
+        if self.in_pair { self.first_pause() } else { LONGEST_PAUSE }
     }
 
     /// Exchanges until the connection is of no use, or it is over; whether it was of use before.
@@ -354,10 +365,10 @@ impl Worker {
             let begun = Instant::now();
             let (outputs, ending) = {
                 let state = self.shared.lock();
-                if !state.connected || state.ending && self.fail_safe.is_none() {
+                if !state.connected || state.ending && self.in_pair {
                     return was_of_use;
                 }
-                if let (true, Some(fail_safe)) = (state.ending, &self.fail_safe) {
+                if let (true, Some(fail_safe)) = (state.ending, &state.fail_safe) {
                     (Some((fail_safe.clone(), Instant::now())), true)
                 } else {
                     (state.outputs.clone(), false)

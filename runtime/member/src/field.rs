@@ -40,6 +40,10 @@ impl FieldDriver for Equipment {
         self.0.connect(connects);
     }
 
+    fn end_with(&mut self, outputs: &Image) {
+        self.0.end_with(outputs);
+    }
+
     fn sense<'frame>(&mut self, _frame: &'frame Frame) -> Option<&'frame Image> {
         None
     }

@@ -127,7 +127,7 @@ pub(crate) fn retained_notes(
     let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name()));
     let files = files.with_program(kept).with_authority(owner.authority);
     let mut notes = files.notes(Some(owner));
-    let is_retentive = settings.restart.is_some();
+    let is_retentive = settings.fallback.restart.is_some();
     // A program without retentive variables only waits for what the one before it has kept.
     notes.is_damaged &= notes.was_retentive.unwrap_or(is_retentive) || is_retentive;
     if notes.files.is_empty() {

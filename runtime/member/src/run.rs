@@ -93,7 +93,7 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     };
     let settings = settings.ok_or_else(wrong)?;
     let field = field_of(options, cluster, member, &settings)?;
-    let is_retentive = settings.restart.is_some();
+    let is_retentive = settings.fallback.restart.is_some();
     let mut machine = RemoteIo::new(Time::default(), settings.clone());
     if let Some((change, configurations)) = &started.restored {
         machine = machine.changed(change, *configurations);
@@ -156,7 +156,7 @@ fn field_of(
         return Ok(Box::new(if has_plant { field.with_plant() } else { field }));
     };
     let period = agreement.schedule.period();
-    let fail_safe = &settings.fail_safe;
+    let fail_safe = &settings.fallback.fail_safe;
     let equipment = if has_own_modules {
         // The modules of one that ends in order are released: those of the other one drive the outputs.
         let released = Image::zero(fail_safe.width());

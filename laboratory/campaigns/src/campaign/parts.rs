@@ -102,7 +102,7 @@ impl<'a> Parts<'a> {
                 members: members.map(|member| (member, true)).collect(),
                 author: Some(Member::RemoteIo(program)),
                 vacant: None,
-                patience_ns: u64::from(place.hold_cycles) * period_ns,
+                patience_ns: u64::from(place.fallback.hold_cycles) * period_ns,
             }
         });
         Self {

@@ -4,11 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Agreement, Conversion, Mode, OnlineChange, Program, ProgramChange, Schedule, Turns,
+    Agreement, Conversion, FallbackChange, Mode, OnlineChange, Program, ProgramChange, Schedule,
+    Turns,
 };
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
-use understudy_remote_io::{PairSettings, PairedInput, Release, StaleState, ValueFault, Wiring};
+use understudy_remote_io::{
+    Fallback, PairSettings, PairedInput, Release, StaleState, ValueFault, Wiring,
+};
 use understudy_simulator::Parts;
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Image, Moment, ProgramHash, ProgramId, StationId,
@@ -57,7 +60,7 @@ impl Conversion for MoreRegisters {
     }
 }
 
-/// The change of the first program.
+/// The change of the first program, and of the hold time and the fail-safe value of its remote I/O.
 fn change(before: &Program, configuration: ConfigurationHash) -> OnlineChange {
     let after = Program { hash: ProgramHash(3), executable: (&changed()).into() };
     let program = ProgramChange {
@@ -67,7 +70,28 @@ fn change(before: &Program, configuration: ConfigurationHash) -> OnlineChange {
         forward: Arc::new(MoreRegisters(true)),
         back: Arc::new(MoreRegisters(false)),
     };
-    OnlineChange { before: configuration, after: ConfigurationHash(4), programs: vec![program] }
+    let after = Fallback { hold_cycles: 2, fail_safe: Image::from_bits([true]), ..fallback() };
+    let fallback = FallbackChange { program: ProgramId(0), before: fallback(), after };
+    OnlineChange {
+        before: configuration,
+        after: ConfigurationHash(4),
+        programs: vec![program],
+        fallbacks: vec![fallback],
+    }
+}
+
+/// What both remote I/Os do where nothing is proved, before the change.
+fn fallback() -> Fallback {
+    Fallback {
+        hold_cycles: 1,
+        trial_cycles: 0,
+        fail_safe: Image::zero(1),
+        ramps: Vec::new(),
+        release: Release::Automatic,
+        value_fault: ValueFault::Hold,
+        stale_state: StaleState::Operator,
+        restart: None,
+    }
 }
 
 /// A plant that toggles, once for each time that it is driven with 1 too; it shows all of its state.
@@ -146,14 +170,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         channels: Vec::new(),
         stop: None,
         diagnosis: None,
-        hold_cycles: 1,
-        trial_cycles: 0,
-        fail_safe: Image::zero(1),
-        ramps: Vec::new(),
-        release: Release::Automatic,
-        value_fault: ValueFault::Hold,
-        stale_state: StaleState::Operator,
-        restart: None,
+        fallback: fallback(),
         pair: None,
         paired_inputs: Vec::new(),
     });

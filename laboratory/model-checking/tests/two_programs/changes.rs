@@ -66,3 +66,12 @@ fn one_of_each_while_some_have_accepted() {
     let steps = [&[SWITCH], &accepted[..]].concat();
     check_from(changing(&everybody(), &steps), 1, Budget { cycles: 3, ..ONE }, 16_634);
 }
+
+/// Nobody proves the program any more, in a remote I/O that has accepted and in one that has not: it falls back by the settings of its own configuration.
+#[test]
+fn two_crashes_while_settings_change() {
+    let budget = Budget { crashes: 2, total: 2, cycles: 1, ..NONE };
+    for steps in [vec![SWITCH], vec![SWITCH, (remote_io(0), ChangeStep::Accept)]] {
+        check_from(changing(&everybody(), &steps), 1, budget, 24_581);
+    }
+}

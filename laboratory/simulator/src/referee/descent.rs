@@ -1,32 +1,52 @@
 //! What may be driven as fail-safe: the configured values, and for outputs with a ramp the values on the way to them.
 
-use understudy_remote_io::Ramp;
+use understudy_remote_io::{Fallback, Ramp};
 use understudy_wire::Image;
 
-/// The last outputs that were not fail-safe, and the deadlines since; nothing where they are not known.
+/// The outputs at which the ramps begin, and the deadlines since; nothing where they are not known.
 #[derive(Debug, Clone, Default, Hash)]
 pub(super) struct Descent {
     begun: Option<(Image, u32)>,
+    /// The last fail-safe outputs.
+    last: Option<Image>,
 }
 
 impl Descent {
     /// Outputs other than fail-safe ones were driven: ramps begin at them.
     pub(super) fn begins_at(&mut self, driven: &Image) {
         self.begun = Some((driven.clone(), 0));
+        self.last = None;
+    }
+
+    /// The fail-safe values are other ones from now on: ramps begin at the last outputs.
+    pub(super) fn begins_anew(&mut self) {
+        if let Some(last) = self.last.take() {
+            self.begun = Some((last, 0));
+        }
     }
 
     /// Records are missing: what the ramps began at is not known.
     pub(super) fn forget(&mut self) {
-        self.begun = None;
+        *self = Self::default();
     }
 
-    /// Takes one deadline with fail-safe outputs; whether they are permitted.
-    ///
-    /// The fail-safe values themselves always are: a remote I/O that has restarted knows no value to begin at.
-    pub(super) fn permits(&mut self, driven: &Image, fail_safe: &Image, ramps: &[Ramp]) -> bool {
+    /// One deadline with fail-safe outputs.
+    pub(super) fn goes_on(&mut self) {
         if let Some((_, deadlines)) = &mut self.begun {
             *deadlines = deadlines.saturating_add(1);
         }
+    }
+
+    /// These fail-safe outputs were driven.
+    pub(super) fn drives(&mut self, driven: &Image) {
+        self.last = Some(driven.clone());
+    }
+
+    /// Whether fail-safe outputs are permitted.
+    ///
+    /// The fail-safe values themselves always are: a remote I/O that has restarted knows no value to begin at.
+    pub(super) fn permits(&self, driven: &Image, fallback: &Fallback) -> bool {
+        let Fallback { fail_safe, ramps, .. } = fallback;
         if driven == fail_safe {
             return true;
         }

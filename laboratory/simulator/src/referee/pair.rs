@@ -67,6 +67,7 @@ impl Referee {
         at: Time,
         event: &Event,
     ) -> Result<(), Violation> {
+        self.fallbacks.speaks(member);
         match event {
             Event::Applied { moment, sampled, outputs, source, .. }
                 if self.is_late(member, *moment, at) =>

@@ -1,12 +1,12 @@
 //! A referee that never blows its whistle proves nothing: every kind of violation is shown to it.
 
-use understudy_cycle::{Agreement, Mode, Schedule};
+use understudy_cycle::{Agreement, FallbackChange, Mode, Schedule};
 use understudy_logic::CircuitBuilder;
-use understudy_remote_io::{PointPlace, Release, StaleState, ValueFault};
+use understudy_remote_io::{Fallback, PointPlace, Ramp, Release, StaleState, ValueFault};
 use understudy_typed::Elementary;
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, Member, ProgramId, Role, StationSet, Time, Write,
-    WriteId,
+    ClusterHash, ConfigurationHash, Configurations, Cycle, Epoch, Member, ProgramId, Role,
+    StationSet, Time, Write, WriteId,
 };
 
 use super::*;
@@ -44,6 +44,15 @@ fn referee() -> Referee {
         channels: Vec::new(),
         stop: None,
         diagnosis: None,
+        fallback: fallback(),
+        pair: None,
+        paired_inputs: Vec::new(),
+    };
+    Referee::new(&settings, (&circuit).into())
+}
+
+fn fallback() -> Fallback {
+    Fallback {
         hold_cycles: 2,
         trial_cycles: 0,
         fail_safe: Image::zero(1),
@@ -52,10 +61,7 @@ fn referee() -> Referee {
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
         restart: None,
-        pair: None,
-        paired_inputs: Vec::new(),
-    };
-    Referee::new(&settings, (&circuit).into())
+    }
 }
 
 /// The same remote I/O, whose input operators write.
@@ -310,15 +316,17 @@ fn a_state_that_a_station_holds_ends_a_gap() {
 #[track_caller]
 fn descends(driven: &[(bool, u16)], permitted: bool) {
     let place = PointPlace { bit: 16, of: Elementary::Int };
-    let ramp = Ramp { place, step: 2.5 };
+    let ramps = vec![Ramp { place, step: 2.5 }];
     let image = |switch: bool, number: u16| {
         let bits = (0..16).map(|bit| switch && bit == 0);
         Image::from_bits(bits.chain((0..16).map(|bit| number >> bit & 1 == 1)))
     };
+    let fallback = Fallback { ramps, fail_safe: image(false, 0), ..fallback() };
     let mut descent = Descent::default();
     descent.begins_at(&image(true, 10));
     let found = driven.iter().all(|&(switch, number)| {
-        descent.permits(&image(switch, number), &image(false, 0), &[ramp])
+        descent.goes_on();
+        descent.permits(&image(switch, number), &fallback)
     });
     assert_eq!(found, permitted, "{driven:?}");
 }
@@ -331,6 +339,51 @@ fn only_a_ramp_and_its_end_are_fail_safe() {
     descends(&[(false, 4)], false);
     descends(&[(false, 12)], false);
     descends(&[(true, 8)], false);
+}
+
+/// The settings are those of the configuration that the remote I/O runs: older and newer ones are wrong, and only of one that has started again neither is.
+#[test]
+fn only_the_settings_of_its_configuration_are_permitted() {
+    let [before, after] = [ConfigurationHash(1), ConfigurationHash(2)];
+    let new = Fallback { hold_cycles: 3, fail_safe: bit(true), ..fallback() };
+    let changed = FallbackChange { program: ProgramId(0), before: fallback(), after: new };
+    let (programs, fallbacks) = (Vec::new(), vec![changed]);
+    let change = Arc::new(OnlineChange { before, after, programs, fallbacks });
+    let remote_io = Member::RemoteIo(ProgramId(0));
+    let configured = |own| Event::Configured(Configurations { own, prepared: None });
+    // After one proved output of 1: whether so many are held, and what is driven then.
+    let run = |own: Option<ConfigurationHash>, again: bool, held: u64, fail_safe: bool| {
+        let mut referee = referee();
+        referee.learn(&change);
+        let mut take = |cycle, event: &Event| referee.observe_from(remote_io, Time(cycle), event);
+        take(1, &sampled(1, &[], true)).expect("a cold start");
+        take(1, &applied(1, true, Source::Direct)).expect("proved");
+        if let Some(own) = own {
+            take(1, &configured(own)).expect("no output");
+        }
+        if again {
+            referee.starts_again();
+        }
+        let mut take = |cycle, event: &Event| referee.observe_from(remote_io, Time(cycle), event);
+        let mut held = (2..2 + held).map(|cycle| applied(cycle, true, Source::Held));
+        let is_held = held.all(|event| take(2, &event).is_ok());
+        (is_held, take(9, &applied(9, fail_safe, Source::FailSafe)).is_ok())
+    };
+    for own in [None, Some(before)] {
+        assert_eq!(run(own, false, 2, false), (true, true));
+        assert_eq!(run(own, false, 3, true), (false, false));
+    }
+    assert_eq!(run(Some(after), false, 3, true), (true, true));
+    assert_eq!(run(Some(after), false, 4, false), (false, false));
+    // What a change that was not told leads to is not known, so it is not called wrong.
+    assert_eq!(run(Some(ConfigurationHash(7)), false, 5, true), (true, true));
+    for own in [None, Some(before), Some(after)] {
+        assert_eq!(
+            (run(own, true, 3, true), run(own, true, 2, false)),
+            ((true, true), (true, true))
+        );
+        assert!(!run(own, true, 4, true).0);
+    }
 }
 
 /// An author is suspended after its outputs of cycle 3, and writes the record at last when its twin has proved cycle 5.

@@ -192,6 +192,8 @@ impl Simulation {
                 *misled = has_wrong_programs.then(|| misled.unwrap_or_default());
                 let change = self.parts.change.clone();
                 let machine = self.disks.remote_io(self.now, settings, change.as_ref());
+                let own = machine.configurations().own;
+                self.referees[program.index()].starts_with(member, own);
                 if let Some(slot) = self.remote_io_slot(member) {
                     slot.restart(machine);
                     let due = slot.due();

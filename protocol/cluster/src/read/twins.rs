@@ -176,7 +176,7 @@ fn check_outputs(
         diagnostics
             .push(found.with_help("use wiring \"exclusive\" for a program with this output"));
     }
-    let safe = &remote_io.fail_safe;
+    let safe = &remote_io.fallback.fail_safe;
     let is_set = |first: u32, bits: u32| {
         (first..first + bits).map(|bit| bit as usize).any(|bit| bit < safe.width() && safe.get(bit))
     };

@@ -359,16 +359,9 @@ fn settings_that_need_a_stop_are_named_as_in_the_file() {
         ("10ms", "20ms".to_owned(), "`period` of the cluster changes from `10ms` to `20ms`"),
         (
             remote_io,
-            with("hold_cycles = 5"),
-            "`hold_cycles` of remote I/O `one-io` changes from `3` to `5`",
+            with("twin = { name = \"second\", wiring = \"exclusive\" }"),
+            "`twin` of remote I/O `one-io` changes",
         ),
-        (
-            remote_io,
-            with("hold_cycles = 5\nvalue_fault = \"fail-safe\""),
-            "`hold_cycles` of remote I/O `one-io` changes from `3` to `5`; `value_fault` of remote I/O `one-io` changes from `hold` to `fail-safe`",
-        ),
-        (remote_io, with("trial_cycles = 7"), "`trial_cycles` of remote I/O `one-io` changes"),
-        (remote_io, with("fail_safe = { z = true }"), "`fail_safe` of remote I/O `one-io` changes"),
         (
             remote_io,
             with("inputs = { a = { operator = \"level\" } }"),

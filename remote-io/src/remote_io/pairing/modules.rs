@@ -80,7 +80,7 @@ impl RemoteIo {
     }
 
     /// Whether it has modules that nothing else writes, so that it is connected to them whatever its part is.
-    pub(super) fn has_own_modules(&self) -> bool {
+    pub(in crate::remote_io) fn has_own_modules(&self) -> bool {
         self.pairing.as_ref().is_some_and(|pairing| pairing.modules.is_some())
     }
 
@@ -189,7 +189,7 @@ impl RemoteIo {
 
     /// The modules of this remote I/O drive nothing until the author is received.
     pub(super) fn release_modules(&mut self) {
-        let released = Image::zero(self.settings.fail_safe.width());
+        let released = Image::zero(self.settings.fallback.fail_safe.width());
         let Some(modules) = self.pairing.as_mut().and_then(|it| it.modules.as_mut()) else {
             return;
         };
@@ -201,7 +201,7 @@ impl RemoteIo {
     /// A deadline is over, at which a follower has received no outputs for a period: they stay, and are released after some time.
     pub(super) fn follow_outputs(&mut self, now: Time) {
         let period = self.period();
-        let released = Image::zero(self.settings.fail_safe.width());
+        let released = Image::zero(self.settings.fallback.fail_safe.width());
         let Some(pairing) = self.pairing.as_mut().filter(|it| it.part != Part::Author) else {
             return;
         };
@@ -239,7 +239,8 @@ impl RemoteIo {
 
     /// Takes what the other one has sent of its modules. What is not sent in answer to a frame of the last periods may be older, and does not count.
     pub(super) fn receive_modules(&mut self, now: Time, theirs: &Pair) {
-        let (inputs, outputs) = (self.settings.undriven.width(), self.settings.fail_safe.width());
+        let (inputs, outputs) =
+            (self.settings.undriven.width(), self.settings.fallback.fail_safe.width());
         let oldest = self.period() * AGE;
         let Some(pairing) = &mut self.pairing else {
             return;

@@ -233,6 +233,7 @@ fn an_answer_that_is_taken_up_late_is_old() {
             outputs: None,
             contested: false,
             connected: true,
+            fail_safe: None,
             ending: false,
         };
         let shared = Arc::new(Shared { state: Mutex::new(state), changed: Notify::new() });
@@ -252,6 +253,25 @@ fn an_answer_that_is_taken_up_late_is_old() {
 }
 
 /// A device of one of two remote I/Os is connected by the author only, and is written to by none that has let it go, nor by one that ends.
+/// The fail-safe values that count at the end are those that it was told last.
+#[test]
+fn a_device_is_left_with_the_newest_fail_safe_values() {
+    let period = Duration::from_millis(2);
+    for newest in [None, Some([true, false])] {
+        let (mut device, held) = started(Ends::After(u64::MAX), period);
+        looks(&mut device, period, 5);
+        if let Some(newest) = newest {
+            device.end_with(&Image::from_bits(newest));
+            looks(&mut device, period, 5);
+        }
+        let coils = || held.coils.lock().expect("no panic").clone();
+        assert_eq!(coils(), BTreeMap::from([(3, true), (800, true)]), "it runs on");
+        drop(device);
+        let [valve, pump] = newest.unwrap_or([false, false]);
+        assert_eq!(coils(), BTreeMap::from([(3, valve), (800, pump)]));
+    }
+}
+
 #[test]
 fn a_device_of_two_remote_ios_is_written_to_by_the_author() {
     let (address, held) = serve(Ends::After(u64::MAX));
@@ -262,6 +282,7 @@ fn a_device_of_two_remote_ios_is_written_to_by_the_author() {
     author.connect(true);
     looks(&mut author, period, 5);
     follower.drive(&Image::from_bits([false, false]), Duration::ZERO);
+    author.end_with(&Image::from_bits([false, true]));
     assert_eq!((connections(), follower.look()), (1, None));
     let coils = || held.coils.lock().expect("no panic").clone();
     let driven = BTreeMap::from([(3, true), (800, true)]);

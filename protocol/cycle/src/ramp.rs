@@ -6,7 +6,7 @@
 
 use understudy_wire::Image;
 
-use crate::source::PointPlace;
+use crate::place::PointPlace;
 
 /// Ramp of one output.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,19 +47,19 @@ impl Ramp {
 
 /// Outputs on their way to the fail-safe values.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct Descent {
+pub struct Descent {
     from: Image,
     deadlines: u32,
 }
 
 impl Descent {
     /// Begins at the outputs that were applied last.
-    pub(crate) fn new(from: Image) -> Self {
+    pub fn new(from: Image) -> Self {
         Self { from, deadlines: 0 }
     }
 
     /// The outputs at the next deadline; `fail_safe` itself once all ramps have ended.
-    pub(crate) fn next(&mut self, fail_safe: &Image, ramps: &[Ramp]) -> Image {
+    pub fn next(&mut self, fail_safe: &Image, ramps: &[Ramp]) -> Image {
         self.deadlines = self.deadlines.saturating_add(1);
         let mut outputs = fail_safe.clone();
         for ramp in ramps {
