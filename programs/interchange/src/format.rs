@@ -238,7 +238,7 @@ fn no_circuit(text: &str, name: &str, inexact: &Inexact) -> Diagnostic {
         _ => 0..0,
     };
     let message = format!("`{name}` is wanted as a circuit, and has none: {inexact}");
-    Diagnostic::error("U0438", message, span).with_help(
+    Diagnostic::error(inexact.code_or("U0438"), message, span).with_help(
         "a circuit has BOOLs, bit strings, integers, timers and counters; scan, verify and stations take the program as it is",
     )
 }
