@@ -466,7 +466,8 @@ pub(crate) fn understudy_of(
     cluster: &Cluster,
 ) -> Result<(Vec<Circuit>, ParityController), (&'static str, String)> {
     let circuits = cluster.circuits().map_err(|(name, inexact)| {
-        ("U0438", format!("the program of `{name}` has no circuit: {inexact}"))
+        let code = inexact.code_or("U0438");
+        (code, format!("the program of `{name}` has no circuit: {inexact}"))
     })?;
     let circuits: Vec<Circuit> = circuits.into_iter().map(Cow::into_owned).collect();
     let parity = match cluster.parity() {

@@ -175,7 +175,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 /// Code of the error that prevented the conversion.
 pub(crate) fn code(error: &WriteError) -> &'static str {
     match error {
-        WriteError::ReadOnly | WriteError::Program(_) | WriteError::NotHeld(_) => "U1014",
+        WriteError::Program(error) => error.code_or("U1014"),
+        WriteError::ReadOnly | WriteError::NotHeld(_) => "U1014",
         WriteError::Different(_) => "U1019",
     }
 }

@@ -3,15 +3,15 @@
 mod answer;
 mod numbers;
 
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use understudy_bits::Disagreement;
 use understudy_cluster::{Cluster, Overrides};
 use understudy_interchange::{NOT_EXECUTED, Source, Wanted};
-use understudy_ladder::Program;
+use understudy_ladder::{LowerError, Program};
 use understudy_text::duration::parse_positive;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
@@ -161,8 +161,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
 }
 
 /// The failure of a program that does not become a circuit.
-fn not_lowered(error: impl Display) -> Answer {
-    Answer::failed(Status::BadInput, "U0436", error)
+fn not_lowered(error: LowerError) -> Answer {
+    Answer::failed(Status::BadInput, error.code_or("U0436"), error)
 }
 
 fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
@@ -342,7 +342,7 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
         }
     }
     patience.turn_to("the understudy".to_owned());
-    let understudy = parity_proof(&cluster, bounds);
+    let understudy = parity_proof(&cluster, bounds)?;
     Ok(answer::of_programs(programs, Some(understudy), None, used(arguments, patience))
         .with_used(reports)
         .and_next(&[&"simulate", &arguments.file]))
@@ -355,16 +355,20 @@ fn used(arguments: &Arguments, patience: &Patience<'_>) -> Option<Resources> {
 
 /// Whether the generated understudy is the sum of its members. With programs that are not executed as circuits stations execute all programs and add
 /// their outputs; then the parity controller is generated and compared that `understudy parity` prints.
-fn parity_proof(cluster: &Cluster, bounds: Bounds<'_>) -> UnderstudyProof {
+fn parity_proof(cluster: &Cluster, bounds: Bounds<'_>) -> Result<UnderstudyProof, Answer> {
     let (members, generated) = match files::understudy_of(cluster) {
         Ok(found) => found,
+        Err((code @ Disagreement::CODE, reason)) => {
+            return Err(Answer::failed(Status::Failed, code, reason));
+        }
         Err((_, reason)) => {
-            return UnderstudyProof::LeftOut(format!(
+            return Ok(UnderstudyProof::LeftOut(format!(
                 "no parity controller is generated and compared, since {reason}; the understudy executes the programs themselves and adds their outputs"
-            ));
+            )));
         }
     };
-    match prove_parity_while(&members, generated.circuit(), bounds.nodes, bounds.go_on) {
+    let proof = prove_parity_while(&members, generated.circuit(), bounds.nodes, bounds.go_on);
+    Ok(match proof {
         Ok(proof) => UnderstudyProof::Proved(format!(
             "the understudy equals the sum of its members: {} registers and {} outputs compared",
             proof.registers, proof.outputs
@@ -373,5 +377,5 @@ fn parity_proof(cluster: &Cluster, bounds: Bounds<'_>) -> UnderstudyProof {
             UnderstudyProof::Undecided(undecided.to_string())
         }
         Err(refutation) => UnderstudyProof::Fails(refutation.to_string()),
-    }
+    })
 }

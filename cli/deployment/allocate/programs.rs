@@ -134,8 +134,12 @@ fn ladder(path: &Path, period: Duration) -> Result<(Member, Vec<Report>), Answer
         _ => None,
     };
     let circuit = match &typed {
-        Some(typed) => exact(typed).map_err(|inexact| failed("U0438", inexact.to_string())),
-        None => ladder.lower(period).map_err(|error| failed("U0436", error.to_string())),
+        Some(typed) => {
+            exact(typed).map_err(|inexact| failed(inexact.code_or("U0438"), inexact.to_string()))
+        }
+        None => {
+            ladder.lower(period).map_err(|error| failed(error.code_or("U0436"), error.to_string()))
+        }
     };
     let (name, circuit) = (ladder.name.to_string(), circuit?);
     Ok((Member { name, ladder, circuit, typed }, reports))

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use understudy_allocation::{Group as Wanted, Member, Resources, Verification};
+use understudy_bits::Inexact;
 use understudy_ladder::from_circuit;
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
@@ -89,7 +90,8 @@ fn subject(
     period: Duration,
     properties: &[(Report, Properties)],
 ) -> Result<Subject, Answer> {
-    let failed = |error: &dyn Display| Answer::failed(Status::BadInput, "U0436", error);
+    let failed = |code, error: &dyn Display| Answer::failed(Status::BadInput, code, error);
+    let inexact = |error: Inexact| failed(error.code_or("U0436"), &error);
     let asked = property::Asked::of(properties.iter().map(|(_, found)| found));
     let right = |wrong: &dyn Fn(&Property) -> Vec<Diagnostic>| {
         for (report, found) in properties {
@@ -104,14 +106,14 @@ fn subject(
         Ok(())
     };
     let Some(typed) = &member.typed else {
-        let subject =
-            Subject::new(&member.ladder, period, &asked).map_err(|error| failed(&error))?;
+        let subject = Subject::new(&member.ladder, period, &asked)
+            .map_err(|error| failed(error.code_or("U0436"), &error))?;
         right(&|assumed| subject.wrong_assumption(assumed))?;
         return Ok(subject);
     };
-    let model = Model::of_program(typed, &asked).map_err(|error| failed(&error))?;
+    let model = Model::of_program(typed, &asked).map_err(inexact)?;
     right(&|assumed| model.wrong_assumption(assumed))?;
-    model.exact().map_err(|error| failed(&error))
+    model.exact().map_err(inexact)
 }
 
 fn verification(

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_bits::{Member, Source, Unsupported};
+use understudy_bits::{Inexact, Member, Source};
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
 use understudy_typed::{Elementary, Point, Program};
 use understudy_verification::numbers::Model;
@@ -198,6 +198,6 @@ fn signal_of_valid(remote_io: &RemoteIo, point: &Point) -> Option<String> {
     Some(found?.name.clone())
 }
 
-fn unsupported(error: &Unsupported) -> Answer {
-    Answer::failed(Status::Failed, "U0447", error)
+fn unsupported(error: &Inexact) -> Answer {
+    Answer::failed(Status::Failed, error.code_or("U0447"), error)
 }

@@ -81,7 +81,7 @@ pub enum NotProved {
     )]
     TooLarge(usize),
     /// The ladder is invalid.
-    #[error("U1243: {0}")]
+    #[error("{code}: {0}", code = .0.code_or("U1243"))]
     NoCircuit(#[from] LowerError),
     /// A bit of the correspondence is not in the ladder.
     #[error("U1244: the combined ladder has no bit `{0}`")]
@@ -94,7 +94,7 @@ impl NotProved {
         match self {
             Self::Refuted { .. } => "U1241",
             Self::TooLarge(_) => "U1242",
-            Self::NoCircuit(_) => "U1243",
+            Self::NoCircuit(error) => error.code_or("U1243"),
             Self::NoBit(_) => "U1244",
         }
     }

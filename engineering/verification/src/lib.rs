@@ -9,7 +9,6 @@ pub mod numbers;
 mod parity;
 pub mod program;
 pub mod property;
-mod random;
 pub mod smv;
 pub mod symbolic;
 mod table;

@@ -62,28 +62,36 @@ impl Model {
     /// numbers that are `asked`. An assumption that is [refused](Self::wrong_assumption) is left out.
     ///
     /// # Errors
-    /// What of the program cannot be followed.
-    pub fn of_program(program: &Program, asked: &Asked<'_>) -> Result<Self, Unsupported> {
+    /// What of the program cannot be followed; a scan in which the circuit does something else.
+    pub fn of_program(program: &Program, asked: &Asked<'_>) -> Result<Self, Inexact> {
         let names = compared::names(&asked.compared);
         let system = System::within_subranges(program, names)?;
         let own = program.outputs.iter().filter(|point| point.name != Program::FAULT);
         let own: HashSet<&str> = own.map(|point| point.name.as_str()).collect();
         let outputs = system.observed.iter().take_while(|(name, _)| own.contains(name.as_str()));
         let outputs = outputs.count();
-        Self::of(system, outputs, asked)
+        Self::of(system, outputs, asked)?.beside(&[program])
     }
 
     /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
     ///
     /// # Errors
-    /// What of a program cannot be followed.
+    /// As [`Self::of_program`].
     pub fn of_cluster(
         name: &str,
         members: &[Member<'_>],
         asked: &Asked<'_>,
-    ) -> Result<Self, Unsupported> {
+    ) -> Result<Self, Inexact> {
         let names = compared::names(&asked.compared);
-        Self::of(System::of_cluster(name, members, names)?, 0, asked)
+        let model = Self::of(System::of_cluster(name, members, names)?, 0, asked)?;
+        let programs: Vec<&Program> = members.iter().map(|member| member.program).collect();
+        model.beside(&programs)
+    }
+
+    /// The same, where its circuit does in some hundred scans what the programs do.
+    fn beside(self, programs: &[&Program]) -> Result<Self, Inexact> {
+        self.derivation.beside(&self.system, programs)?;
+        Ok(self)
     }
 
     /// The first BOOLs that can be named are the outputs of a program.

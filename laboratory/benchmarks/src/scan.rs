@@ -40,8 +40,9 @@ struct Found {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let (program, _) = ladder(&arguments.program)?;
     let rungs = program.rungs.len();
-    let circuit =
-        program.lower(PERIOD).map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
+    let circuit = program
+        .lower(PERIOD)
+        .map_err(|error| Answer::failed(Status::BadInput, error.code_or("U0436"), error))?;
     let scan = Scan::new(&circuit);
     let images = images(circuit.inputs().len(), arguments.seed);
     let registers = circuit.registers().iter();

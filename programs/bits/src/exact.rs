@@ -6,6 +6,7 @@ use std::fmt;
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Operation, Variable as Bit};
 use understudy_typed::{Comparison, Elementary, Program};
 
+use crate::beside::{self, Disagreement};
 use crate::circuit::{Derivation, Meaning, unique};
 use crate::execute::Unsupported;
 use crate::extent::Extent;
@@ -22,6 +23,19 @@ pub enum Inexact {
     /// Values that are not followed bit by bit.
     #[error("{}", gaps(.0))]
     Gaps(Vec<Gap>),
+    /// A scan in which the circuit differs from the program.
+    #[error(transparent)]
+    Differs(#[from] Box<Disagreement>),
+}
+
+impl Inexact {
+    /// The code of a defect of the derivation; `usual` of everything else.
+    pub fn code_or(&self, usual: &'static str) -> &'static str {
+        match self {
+            Self::Differs(_) => Disagreement::CODE,
+            Self::Unsupported(_) | Self::Gaps(_) => usual,
+        }
+    }
 }
 
 /// A value that is not followed bit by bit.
@@ -104,10 +118,10 @@ impl Exact {
     /// The circuit of a program whose values are finite. Its inputs and outputs are the bits of the points, in their order: a BOOL under its own name,
     /// the bits of another point as `NAME.0` for the lowest and so on; behind them stands what is shown. A number has as many registers as its values
     /// need; the bits of a BOOL, of a timer or of a counter stand behind the name of the variable. A program that never stops by a fault has
-    /// neither the reset nor the fault among them.
+    /// neither the reset nor the fault among them. Both make the same scans, with inputs at random, before it is given.
     ///
     /// # Errors
-    /// What of the program is not followed, or not bit by bit.
+    /// What of the program is not followed, or not bit by bit; a scan in which the circuit does something else.
     pub fn new(program: &Program, shown: Shown<'_>) -> Result<Self, Inexact> {
         let numbers = shown.compared.iter().map(|compared| compared.number.clone());
         let mut system = System::comparing(program, numbers.collect(), shown.restarts)?;
@@ -163,6 +177,7 @@ impl Exact {
         }
         let layout = Layout::new(program, &system, &derivation, &live);
         let circuit = pruned(&system, &derivation, &outputs, &live, stops);
+        beside::exact(&system, program, &circuit, &shown)?;
         Ok(Self { circuit, layout, points: count })
     }
 

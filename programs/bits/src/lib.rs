@@ -8,6 +8,7 @@
 //! followed, such as a product of reals, is a free input of the circuit, and a *gap*: the circuit then has every run of the program, and more. A circuit
 //! without gaps is exact.
 
+mod beside;
 mod circuit;
 mod exact;
 mod execute;
@@ -20,6 +21,7 @@ mod term;
 #[cfg(test)]
 mod tests;
 
+pub use beside::Disagreement;
 pub use circuit::boundaries::{between, boundary_text, position};
 pub use circuit::{Derivation, Meaning};
 pub use exact::{Compared, Exact, Gap, Inexact, Shown, exact};

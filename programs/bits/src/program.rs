@@ -16,6 +16,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use understudy_typed::{Comparison, Elementary, Operation, Parts, Point, Points, Program};
 
+use crate::beside::{Placed, told};
 use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
 use crate::system::{Holds, Source, System};
@@ -416,6 +417,7 @@ impl System {
             let counted = self.terms.choose(can_fault, begun, more);
             self.cells[counter as usize].next = self.terms.choose(begins, counted, was);
         }
+        let mut restarts = None;
         if can_restart {
             let cells = [stopped, scans, phase].into_iter().chain(numbers.values().copied());
             let cells = cells.chain(times.iter().chain(&clock).chain(&time).map(|age| age.cell));
@@ -423,8 +425,13 @@ impl System {
             cells.sort_unstable();
             let restart = Restart { prefix, program, cells, ages: times, time };
             let roots = after.values_mut().chain([&mut faulted]);
-            self.let_restart(&restart, &mut roots.collect::<Vec<_>>());
+            restarts = Some(self.let_restart(&restart, &mut roots.collect::<Vec<_>>()));
         }
+        let told = told(prefix, program, &after, faulted);
+        self.programs.push(Placed { inputs: inputs.to_vec(), runs, restarts, told });
+        let limited = program.inputs.iter().filter_map(|point| Some((point, point.range?)));
+        self.subranges
+            .extend(limited.map(|(point, range)| (format!("{prefix}{}", point.name), range)));
         Ok(self.observe(prefix, program, &after, faulted))
     }
 

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 
 use understudy_typed::{Comparison, Declared, Elementary, Part, Point, Program};
 
+use crate::beside::Placed;
 use crate::circuit::boundaries::position;
 use crate::execute::timers::Counted;
 use crate::program::AnyValue;
@@ -81,6 +82,10 @@ pub struct System {
     pub observed: Vec<(String, Term)>,
     /// Values that a run shows beside them.
     pub shown: Vec<(String, Term)>,
+    /// The programs, in their order.
+    pub(crate) programs: Vec<Placed>,
+    /// The subranges that inputs are declared with, by their names here.
+    pub(crate) subranges: HashMap<String, (i128, i128)>,
     /// Whether programs with retentive variables are restarted.
     pub(crate) restarts: bool,
     /// The inputs that restart programs, by their numbers.
@@ -178,6 +183,8 @@ impl System {
             seen: BTreeSet::new(),
             observed: Vec::new(),
             shown: Vec::new(),
+            programs: Vec::new(),
+            subranges: HashMap::new(),
             restarts: false,
             restarting: Vec::new(),
             most: BTreeMap::new(),

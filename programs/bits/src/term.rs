@@ -378,6 +378,7 @@ impl Terms {
     /// The values of all terms, for values of the variables. Where an unknown value is reached it is 0.
     pub fn evaluate(&self, variable: impl Fn(Variable) -> u64) -> Vec<u64> {
         let mut values: Vec<u64> = Vec::with_capacity(self.nodes.len());
+        let mut given = Vec::new();
         for (of, node) in &self.nodes {
             let of_term = |term: &Term| values[term.0 as usize];
             let value = match node {
@@ -385,8 +386,9 @@ impl Terms {
                 Node::Variable(which) => variable(*which) & of.mask(),
                 Node::Unknown(_) => 0,
                 Node::Apply(operation, operands) => {
-                    let operands: Vec<u64> = operands.iter().map(of_term).collect();
-                    operation.apply(&operands).unwrap_or(0)
+                    given.clear();
+                    given.extend(operands.iter().map(of_term));
+                    operation.apply(&given).unwrap_or(0)
                 }
                 Node::Choose([condition, then, otherwise]) => {
                     of_term(if of_term(condition) != 0 { then } else { otherwise })

@@ -1,14 +1,14 @@
 //! A system does what the machine does, and its circuit has every run of it.
 
+mod beside;
 mod timers;
 
 use std::collections::BTreeSet;
 
 use understudy_structured_text::{Options, lower};
-use understudy_testing::random::Dice;
-use understudy_typed::{Elementary, Fault, Machine, Program, Scratch};
+use understudy_typed::{Elementary, Machine, Program, Scratch};
 
-use crate::{Derivation, Meaning, Node, System, Terms, Variable, position};
+use crate::{Derivation, Meaning, Node, System, Terms, Variable};
 
 fn lowered(text: &str) -> Program {
     let (file, _) = understudy_structured_text::parser::parse(text);
@@ -17,32 +17,7 @@ fn lowered(text: &str) -> Program {
     lowered.program.unwrap_or_else(|| panic!("{:?}", lowered.diagnostics))
 }
 
-/// An input that is often at a bound or near a constant.
-fn value(random: &mut Dice, of: Elementary, constants: &[u64]) -> u64 {
-    let any = random.number();
-    let stored = match any % 4 {
-        0 if !constants.is_empty() => constants[(any >> 8) as usize % constants.len()],
-        1 => any >> 8 & 7,
-        2 => {
-            let small = (any >> 8) as i32 % 400 - 200;
-            match of {
-                Elementary::Real => (small as f32 / 4.0).to_bits().into(),
-                Elementary::Lreal => (f64::from(small) / 4.0).to_bits(),
-                _ => i64::from(small) as u64,
-            }
-        }
-        _ => any.rotate_left(17),
-    } & of.mask();
-    match position(of, stored) {
-        Some(_) if of == Elementary::Real && !f32::from_bits(stored as u32).is_finite() => 0,
-        Some(_) if of == Elementary::Lreal && !f64::from_bits(stored).is_finite() => 0,
-        Some(_) => stored,
-        None => 0,
-    }
-}
-
-/// Runs machine, system and circuit side by side; whether a fault was among the scans. A system within the subranges of the inputs is given the
-/// values of the subranges that are nearest to those of the machine.
+/// Runs machine, system and circuit side by side; whether a fault was among the scans.
 fn compare(program: &Program, seed: u64, scans: usize) -> bool {
     let any = System::of_program(program).expect("a program that is followed");
     let within = System::within_subranges(program, BTreeSet::new()).expect("followed too");
@@ -52,79 +27,13 @@ fn compare(program: &Program, seed: u64, scans: usize) -> bool {
 
 fn compare_with(program: &Program, system: &System, seed: u64, scans: usize) -> bool {
     let derivation = Derivation::new(system).expect("a circuit");
-    let machine = Machine::new(program);
-    let mut random = Dice::new(seed);
-    let mut state = machine.initial().to_vec();
-    let mut scratch = Scratch::default();
-    let mut cells: Vec<u64> = system.cells.iter().map(|cell| cell.initial).collect();
-    let mut circuit = understudy_logic::Running::new(&derivation.circuit);
-    let mut faulted = false;
-    for scan in 0..scans {
-        let mut image = vec![0; machine.input_count().div_ceil(64)];
-        let mut given = Vec::new();
-        for point in &program.inputs {
-            let constants = system.terms.constants(point.of);
-            let mut stored = value(&mut random, point.of, &constants);
-            if point.slot == 0 {
-                stored = u64::from(random.number().is_multiple_of(5));
-            }
-            point.set(&mut image, stored);
-            let (least, greatest) = system.inputs[given.len()].limits;
-            let is_within =
-                position(point.of, stored).is_some_and(|at| least <= at && at <= greatest);
-            given.push(if is_within { stored } else { point.declared().limited(stored) });
+    for pair in derivation.meanings.windows(2) {
+        if let [Meaning::Boundary(one, below), Meaning::Boundary(other, above)] = pair {
+            assert!(one != other || below < above, "boundaries are in order");
         }
-        let mut outputs = vec![0; machine.output_count().div_ceil(64)];
-        machine.step(&mut scratch, &mut state, &image, &mut outputs);
-        let values = system.terms.evaluate(|variable| match variable {
-            Variable::Input(number) => given[number as usize],
-            Variable::Cell(number) => cells[number as usize],
-        });
-        let of = |term| values[Terms::index(term)];
-        for point in &program.outputs {
-            let expected = point.get(&outputs);
-            let named = system.observed.iter().chain(&system.shown);
-            let found = named.clone().find(|(name, _)| *name == point.name);
-            let (_, term) = found.expect("an output is observed");
-            assert_eq!(of(*term), expected, "{} in scan {scan}", point.name);
-        }
-        faulted |= Fault::read(&state).is_some();
-        let mut below: Option<(crate::Term, bool)> = None;
-        let inputs: Vec<bool> = derivation
-            .meanings
-            .iter()
-            .map(|meaning| match *meaning {
-                Meaning::Bit(number, bit) => given[number as usize] >> bit & 1 == 1,
-                Meaning::Boundary(term, boundary) => {
-                    let at = position(system.terms.of(term), of(term));
-                    let is = at.is_some_and(|at| at <= boundary);
-                    let before = below.is_some_and(|(known, is)| known == term && is);
-                    assert!(is || !before, "boundaries are in order");
-                    below = Some((term, is));
-                    is
-                }
-                Meaning::NotANumber(term) => position(system.terms.of(term), of(term)).is_none(),
-                Meaning::Less(left, right) => {
-                    let place = |term| position(system.terms.of(term), of(term));
-                    place(left).zip(place(right)).is_some_and(|(left, right)| left < right)
-                }
-                Meaning::Equal(left, right) => {
-                    let place = |term| position(system.terms.of(term), of(term));
-                    place(left).zip(place(right)).is_some_and(|(left, right)| left == right)
-                }
-                Meaning::Free(term, bit) => {
-                    let number = system.terms.of(term).signed(of(term));
-                    number.div_euclid(derivation.unit(term)) >> bit & 1 == 1
-                }
-            })
-            .collect();
-        let told = circuit.step(&inputs);
-        for ((name, term), told) in system.observed.iter().zip(told) {
-            assert_eq!(told, of(*term) != 0, "{name} of the circuit in scan {scan}");
-        }
-        cells = system.cells.iter().map(|cell| of(cell.next)).collect();
     }
-    faulted
+    let compared = derivation.compared(system, &[program], (seed, scans));
+    compared.unwrap_or_else(|differs| panic!("{differs}"))
 }
 
 const PROGRAMS: [&str; 11] = [

@@ -1,6 +1,7 @@
 //! Digest of the outputs of a program over many scans with pseudo-random inputs. A program has one digest, on every processor and in
 //! every build: replicas on different machines agree bit for bit, or their digests differ.
 
+use understudy_logic::Random;
 use understudy_typed::{Elementary, Point, Program};
 
 use crate::{Executable, Interface, Scratch};
@@ -36,8 +37,8 @@ pub fn digest(executable: &Executable, interface: &Interface, scans: u64) -> Dig
         for point in inputs.iter() {
             if Some(point) == reset {
                 point.set(&mut read, u64::from(stopped));
-            } else if random.number().is_multiple_of(4) {
-                point.set(&mut read, random.value(point));
+            } else if random.is_one_of(4) {
+                point.set(&mut read, value(&mut random, point));
             }
         }
         executable.step(&mut scratch, &mut state, &read, &mut driven);
@@ -49,34 +50,21 @@ pub fn digest(executable: &Executable, interface: &Interface, scans: u64) -> Dig
     digest
 }
 
-/// Random numbers: SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn number(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
-    }
-
-    /// A value as it is stored: reals from -1000 to 1000 in thousandths, times up to 10 s, everything else in the subrange
-    /// or the range of its type.
-    fn value(&mut self, point: &Point) -> u64 {
-        let number = self.number();
-        let real = (number % 2_000_001) as f64 / 1000.0 - 1000.0;
-        match point.of {
-            Elementary::Real => u64::from((real as f32).to_bits()),
-            Elementary::Lreal => real.to_bits(),
-            of if of.is_time() => number % 10_000_000_000,
-            of => match point.range {
-                Some((low, high)) => {
-                    let count = high.abs_diff(low).saturating_add(1);
-                    low.wrapping_add_unsigned(u128::from(number) % count) as u64 & of.mask()
-                }
-                None => number & of.mask(),
-            },
-        }
+/// A value as it is stored: reals from -1000 to 1000 in thousandths, times up to 10 s, everything else in the subrange
+/// or the range of its type.
+fn value(random: &mut Random, point: &Point) -> u64 {
+    let number = random.number();
+    let real = (number % 2_000_001) as f64 / 1000.0 - 1000.0;
+    match point.of {
+        Elementary::Real => u64::from((real as f32).to_bits()),
+        Elementary::Lreal => real.to_bits(),
+        of if of.is_time() => number % 10_000_000_000,
+        of => match point.range {
+            Some((low, high)) => {
+                let count = high.abs_diff(low).saturating_add(1);
+                low.wrapping_add_unsigned(u128::from(number) % count) as u64 & of.mask()
+            }
+            None => number & of.mask(),
+        },
     }
 }

@@ -233,6 +233,7 @@ fn of_statements(name: &str, text: &str, typed: &Typed) -> Option<Program> {
 fn no_circuit(text: &str, name: &str, inexact: &Inexact) -> Diagnostic {
     let at = match inexact {
         Inexact::Unsupported(reason) => Some((&reason.routine, reason.line)),
+        Inexact::Differs(_) => None,
         Inexact::Gaps(gaps) => {
             gaps.iter().find_map(|gap| gap.at.as_ref()).map(|(routine, line)| (routine, *line))
         }
@@ -241,7 +242,7 @@ fn no_circuit(text: &str, name: &str, inexact: &Inexact) -> Diagnostic {
     let line = at.filter(|(routine, line)| routine.eq_ignore_ascii_case(name) && *line > 0);
     let span = line.map_or(0..0, |(_, line)| Lines::new(text).range(line as usize - 1));
     let message = format!("`{name}` is wanted as a circuit, and has none: {inexact}");
-    Diagnostic::error("U0438", message, span).with_help(
+    Diagnostic::error(inexact.code_or("U0438"), message, span).with_help(
         "a circuit has BOOLs, bit strings, integers, timers and counters; scan, verify and stations take the program as it is",
     )
 }

@@ -98,7 +98,7 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
 
 /// The error on rungs that cannot be executed.
 fn not_run(error: &LowerError) -> Diagnostic {
-    Diagnostic::error("U0436", error.to_string(), 0..0)
+    Diagnostic::error(error.code_or("U0436"), error.to_string(), 0..0)
 }
 
 /// The warning on a ladder whose file states another interval than the period at which it runs: it runs in every scan.

@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use understudy_bits::{Compared, Exact, Layout, Shown};
+use understudy_bits::{Compared, Disagreement, Exact, Inexact, Layout, Shown};
 use understudy_logic::Circuit;
 use understudy_structured_text::{Options, lower, parse};
 use understudy_text::{Diagnostic, Severity, has_errors};
@@ -51,6 +51,19 @@ pub enum LowerError {
         /// What is in the way.
         reason: String,
     },
+    /// A scan in which the circuit differs from the program.
+    #[error(transparent)]
+    Differs(Box<Disagreement>),
+}
+
+impl LowerError {
+    /// The code of a defect of the derivation; `usual` of everything else.
+    pub fn code_or(&self, usual: &'static str) -> &'static str {
+        match self {
+            Self::Differs(_) => Disagreement::CODE,
+            Self::Period { .. } | Self::Invalid { .. } | Self::NoCircuit { .. } => usual,
+        }
+    }
 }
 
 fn list(diagnostics: &[Diagnostic]) -> String {
@@ -99,9 +112,9 @@ pub(crate) fn of_text(
 
 fn exact(typed: &Typed, shown: Shown<'_>) -> Result<Exact, LowerError> {
     let shown = Shown { keeps_all: true, ..shown };
-    Exact::new(typed, shown).map_err(|inexact| LowerError::NoCircuit {
-        program: typed.name.clone(),
-        reason: inexact.to_string(),
+    Exact::new(typed, shown).map_err(|inexact| match inexact {
+        Inexact::Differs(found) => LowerError::Differs(found),
+        _ => LowerError::NoCircuit { program: typed.name.clone(), reason: inexact.to_string() },
     })
 }
 

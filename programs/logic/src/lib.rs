@@ -13,6 +13,7 @@ mod normal_form;
 pub mod notation;
 mod packed;
 mod polynomial;
+mod random;
 mod running;
 mod scan;
 
@@ -23,5 +24,6 @@ pub use lanes::{LANES, Lanes, Run, transpose};
 pub use normal_form::{Monomial, NormalForm, TooManyMonomials};
 pub use packed::{bit, ones, ones_in, pack, unpack};
 pub use polynomial::Polynomial;
+pub use random::Random;
 pub use running::Running;
 pub use scan::{SPARSE, Scan, Scratch, Sparse, SparseRun};

@@ -137,7 +137,7 @@ pub enum ProofError {
     #[error("U0871: the map does not fit the automata ({} findings)", .0.len())]
     Partition(Vec<Diagnostic>),
     /// The ladder does not become a circuit.
-    #[error("U0872: {0}")]
+    #[error("{code}: {0}", code = .0.code_or("U0872"))]
     Lower(#[from] LowerError),
     /// A bit that the correspondence names is not in the ladder, or does not outlast a scan.
     #[error("U0873: `{name}` is no bit of the ladder that lasts from scan to scan")]
@@ -160,7 +160,7 @@ impl ProofError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Partition(_) => "U0871",
-            Self::Lower(_) => "U0872",
+            Self::Lower(error) => error.code_or("U0872"),
             Self::NoBit { .. } => "U0873",
             Self::TooLarge { .. } => "U0874",
         }

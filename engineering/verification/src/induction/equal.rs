@@ -13,11 +13,10 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 
-use understudy_logic::{Circuit, CircuitBuilder, Scan, Scratch, Variable};
+use understudy_logic::{Circuit, CircuitBuilder, Random, Scan, Scratch, Variable};
 
 use super::clauses::{Patience, Unrolling};
 use crate::effort::ALWAYS;
-use crate::random::mixed;
 use crate::symbolic::Cone;
 
 /// Rounds of scans at random that split nothing, after which the solver goes on.
@@ -102,7 +101,7 @@ impl Parts {
 
     fn split_at_random(&mut self, circuit: &Circuit) {
         let scan = Scan::new(circuit);
-        let (mut scratch, mut random) = (Scratch::default(), 1_u64);
+        let (mut scratch, mut random) = (Scratch::default(), Random(1));
         let first =
             |register: usize| u64::from(circuit.registers()[register].initial).wrapping_neg();
         let mut inputs = vec![[0; 1]; scan.input_count()];
@@ -110,7 +109,7 @@ impl Parts {
         let mut state = vec![[0; 1]; scan.register_count()];
         let mut quiet = 0;
         while quiet < ROUNDS && !self.equal().is_empty() {
-            inputs.fill_with(|| [mixed(&mut random)]);
+            inputs.fill_with(|| [random.number()]);
             for (register, part) in self.0.iter().enumerate() {
                 state[register][0] = first(register)
                     ^ match *part {
@@ -129,8 +128,8 @@ impl Parts {
 }
 
 /// The values of a register in 64 states: half of them any, the others 1 in few, in most or in all, as counts need it that are nearly over.
-fn often_equal(random: &mut u64) -> u64 {
-    let [one, two, three] = [0; 3].map(|_: u64| mixed(random));
+fn often_equal(random: &mut Random) -> u64 {
+    let [one, two, three] = [0; 3].map(|_: u64| random.number());
     let few = one & two & three & 0xffff << 32;
     let many = (one | two | three) & 0xff << 48;
     one & 0xffff_ffff | few | many | 0xff << 56

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use understudy_bits::{
     Derivation, Meaning, Node, System, Term, Terms, Variable, between, boundary_text, position,
 };
+use understudy_logic::Random;
 use understudy_typed::Elementary;
 
 use super::{Run, holds_in};
@@ -100,7 +101,7 @@ impl<'s> Replay<'s> {
         }
         let pools: Vec<Vec<u64>> =
             (0..self.system.inputs.len()).map(|input| self.pool(input)).collect();
-        let mut dice = Dice(1);
+        let mut dice = Random(1);
         let mut left = (EVALUATIONS / self.system.terms.len().max(1)).max(SCANS);
         while left > 0 {
             if !(self.go_on)(Work::Scans(0)) {
@@ -419,19 +420,4 @@ fn some_value(of: Elementary, above: i128, at_most: i128, which: usize) -> u64 {
     };
     let value = between(of, Some(ends.0), Some(ends.1));
     value.or_else(|| between(of, Some(above), Some(at_most))).unwrap_or(0)
-}
-
-/// Numbers that look drawn, the same in every run of the tool.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, count: usize) -> usize {
-        // SplitMix64.
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^= mixed >> 31;
-        (mixed % count.max(1) as u64) as usize
-    }
 }

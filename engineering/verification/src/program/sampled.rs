@@ -2,10 +2,9 @@
 
 use std::array;
 
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, Random, Scan, Scratch};
 
 use crate::property::Formula;
-use crate::random::mixed;
 use crate::symbolic::{Resolved, Signal};
 
 /// Scans of each of the 64 runs.
@@ -37,7 +36,7 @@ impl Sampled {
         let mut inputs = vec![[0]; scan.input_count()];
         let mut seen = vec![None; questions.len()];
         let mut rows = Vec::with_capacity(SCANS);
-        let mut random = 1_u64;
+        let mut random = Random(1);
         let mut open = questions.len();
         for number in 0..SCANS {
             if open == 0 {
@@ -74,8 +73,8 @@ impl Sampled {
 }
 
 /// Which runs an input changes in: half of them every second scan, others every eighth, others every thirty-second, as timers need it.
-fn flips(random: &mut u64) -> u64 {
-    let mut draw = || mixed(random);
+fn flips(random: &mut Random) -> u64 {
+    let mut draw = || random.number();
     let often = draw();
     let seldom = often & draw() & draw();
     let rarely = seldom & draw() & draw();

@@ -69,8 +69,8 @@ impl System {
         Some(Age { cell, most })
     }
 
-    /// Lets a program be restarted in every scan: replaces what it reads of its cells, in their next values and in `roots`.
-    pub(super) fn let_restart(&mut self, restart: &Restart<'_>, roots: &mut [&mut Term]) {
+    /// Lets a program be restarted in every scan: replaces what it reads of its cells, in their next values and in `roots`. The input that restarts it.
+    pub(super) fn let_restart(&mut self, restart: &Restart<'_>, roots: &mut [&mut Term]) -> Term {
         let Restart { prefix, program, cells, ages, time } = restart;
         let name = self.restart_name(prefix, program);
         self.restarting.push(self.inputs.len() as u32);
@@ -107,5 +107,6 @@ impl System {
         for (root, &other) in roots.iter_mut().zip(others) {
             **root = other;
         }
+        restarts
     }
 }

@@ -7,7 +7,7 @@
 use std::collections::{HashMap, HashSet};
 
 use understudy_logic::bdd::Diagrams;
-use understudy_logic::{Circuit, Expression, Graph, Operation, Running, Variable};
+use understudy_logic::{Circuit, Expression, Graph, Operation, Random, Running, Variable};
 
 /// Scans that are compared.
 const SCANS: usize = 500;
@@ -38,10 +38,10 @@ impl Pair<'_> {
         let scans = (MAXIMUM_OPERATIONS / size.max(1)).clamp(LEAST_SCANS, SCANS);
         let (mut one, mut other) = (Running::new(self.before), Running::new(self.after));
         let mut inputs = vec![false; self.before.inputs().len()];
-        let mut changes = Changes(0);
+        let mut random = Random(0);
         for scan in 0..scans {
             for input in &mut inputs {
-                *input ^= changes.next();
+                *input ^= random.is_one_of(3);
             }
             let (left, right) = (one.step(&inputs), other.step(&inputs));
             let differs = |&&(before, after): &&(usize, usize)| left[before] != right[after];
@@ -194,17 +194,4 @@ fn used(circuit: &Circuit, outputs: Vec<usize>) -> Vec<bool> {
         }
     }
     used
-}
-
-/// Which inputs change, in an order that looks like chance and is always the same (SplitMix64): one in three.
-struct Changes(u64);
-
-impl Changes {
-    fn next(&mut self) -> bool {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ (mixed >> 31)).is_multiple_of(3)
-    }
 }

@@ -65,7 +65,11 @@ impl<'a> Ladders<'a> {
             Ok(code) => Some(code),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
-                diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
+                diagnostics.push(Diagnostic::error(
+                    error.code_or("U0212"),
+                    message,
+                    file.span.clone(),
+                ));
                 None
             }
         }
@@ -84,7 +88,8 @@ impl<'a> Ladders<'a> {
             Ok(circuit) => Some(circuit.into_owned().named(name)),
             Err(inexact) => {
                 let message = format!("`{}` has no circuit: {inexact}", file.value);
-                diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
+                let code = inexact.code_or("U0212");
+                diagnostics.push(Diagnostic::error(code, message, file.span.clone()));
                 None
             }
         }
