@@ -161,6 +161,39 @@ fn a_draft_is_right_for_every_type() {
     }
 }
 
+/// Where nothing is said, an output is driven with a value that its declaration has.
+#[test]
+fn a_fail_safe_value_is_one_of_the_declaration() {
+    let folder = empty_folder("whole_numbers_safe");
+    let text = "TYPE Door : (open := 3, shut := 4); END_TYPE\nPROGRAM one\n  VAR_INPUT n : BOOL; END_VAR\n  VAR_OUTPUT d : Door; r : INT (4..9); s : INT (-9..-4); END_VAR\n  d := shut; r := 5; s := -5;\nEND_PROGRAM\n";
+    let other = "PROGRAM two\n  VAR_INPUT d : Door; END_VAR\n  VAR_OUTPUT q : BOOL; END_VAR\n  q := d = shut;\nEND_PROGRAM\n";
+    fs::write(folder.join("one.st"), text).expect("written");
+    let head = "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"one\"\nladder = \"one.st\"\n";
+    fs::write(folder.join("one.toml"), format!("{head}[[understudy]]\nname = \"u\"\n"))
+        .expect("written");
+    let run = |arguments: &[&str]| {
+        let answer = understudy_in(&folder, arguments);
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+        answer.output
+    };
+    let scenario = "title = \"Both stations are killed\"\ncycles = 40\n[[step]]\nat = 10\naction = \"crash\"\nstation = \"one\"\n[[step]]\nat = 10\naction = \"crash\"\nstation = \"u\"\n";
+    fs::write(folder.join("down.toml"), scenario).expect("written");
+    run(&["simulate", "one.toml", "--scenario", "down.toml", "--seed", "1", "--out", "runs"]);
+    for (output, value) in [("d", "open"), ("r", "4"), ("s", "-4")] {
+        let why = run(&["why", output, "runs/latest", "--at", "35"]);
+        assert!(why.starts_with(&format!("one.{output} is {value} ")), "{why}");
+    }
+    // A receiver with other numbers for the names has another value.
+    let signal = "[[controller]]\nname = \"two\"\nladder = \"two.st\"\n[[understudy]]\nname = \"u\"\n[[remote_io]]\ncontroller = \"two\"\n[remote_io.inputs]\nd = { from = \"one.d\", default = \"open\" }\n";
+    fs::write(folder.join("two.toml"), format!("{head}{signal}")).expect("written");
+    for (door, status) in [("open := 3, shut := 4", 0), ("shut := 3, open := 4", 2)] {
+        let text = format!("TYPE Door : ({door}); END_TYPE\n{other}");
+        fs::write(folder.join("two.st"), text).expect("written");
+        let answer = understudy_in(&folder, &["check", "two.toml"]);
+        assert_eq!(answer.status, status, "{door}: {}", answer.shown());
+    }
+}
+
 /// What is written keeps the numbers, and is drafted, as what was read.
 #[test]
 fn conversions_keep_whole_numbers() {

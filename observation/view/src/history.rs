@@ -95,6 +95,8 @@ pub struct History {
     unplaced: VecDeque<(Time, Event)>,
     /// The state after a sample that is still to come.
     awaited: Option<(Moment, (Option<ProgramHash>, Lineage), Image)>,
+    /// The first sample with a change mark, from which on its program is that of an online change.
+    replaced: Option<Moment>,
     end: End,
     order: Order,
 }
@@ -139,6 +141,7 @@ impl History {
             cut: false,
             unplaced: VecDeque::new(),
             awaited: None,
+            replaced: None,
             end: End::default(),
             order: Order::default(),
         })
@@ -227,6 +230,11 @@ impl History {
         self.referee.learn(change);
     }
 
+    /// Whether an online change has replaced the program before a cycle.
+    pub(crate) fn is_replaced(&self, moment: Moment) -> bool {
+        self.replaced.is_some_and(|since| since <= moment)
+    }
+
     /// Its remote I/O starts again.
     pub(crate) fn starts_again(&mut self) {
         self.referee.starts_again();
@@ -277,6 +285,9 @@ impl History {
         event: &Event,
     ) -> (Option<Sampled>, Option<Violation>) {
         let violation = self.referee.observe_from(member, at, event).err();
+        if let Event::Sampled { moment, change: Some(_), .. } = event {
+            self.replaced.get_or_insert(*moment);
+        }
         let Event::Sampled { moment, inputs, before, change: None, .. } = event else {
             // The state before a change mark is one of another program than that which takes the sample.
             return (None, violation);

@@ -179,6 +179,16 @@ fn enumerations_are_named() {
 }
 
 #[test]
+fn a_value_of_an_enumeration_is_declared_once() {
+    let text = "TYPE colour : (red, green, RED); END_TYPE
+        PROGRAM main VAR_OUTPUT x : colour; END_VAR x := green; END_PROGRAM";
+    let (_, found) = read(text, None);
+    let errors = shown(text, &found, Severity::Error);
+    assert!(errors.starts_with("U1042 1:28 the value `RED` is declared twice"), "{errors}");
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+}
+
+#[test]
 fn elements_of_arrays_are_points() {
     let text = "PROGRAM main
         VAR_INPUT on : ARRAY[1..3] OF BOOL := [TRUE, FALSE, TRUE]; n : ARRAY[0..1,0..1] OF INT; END_VAR

@@ -171,8 +171,13 @@ impl Points {
         let (points, values) = before;
         let mut carry = |name: &str| {
             let (point, old) = (self.find(name)?, points.find(name)?);
-            let value = types::converted(old.of, point.of, old.get(values))?;
-            let value = Some(value).filter(|value| point.declared().contains(*value))?;
+            let (before, now) = (old.declared(), point.declared());
+            let stored = old.get(values);
+            let value = match before.value_name(stored).filter(|_| now.values.is_some()) {
+                Some(name) => now.value_named(name),
+                None => types::converted(old.of, point.of, stored),
+            };
+            let value = value.filter(|value| now.has(*value))?;
             point.set(image, value);
             Some(())
         };

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::naming::DAY;
 use crate::types::{Elementary, Enumeration};
 
 /// An input or output of a program.
@@ -49,13 +50,39 @@ impl Declared {
         if known.name.starts_with(is_vowel) { "an" } else { "a" }
     }
 
-    /// Whether every value of `sender` is one of this declaration, stored in the same bits.
+    /// Whether every value of `sender` is one of this declaration, stored in the same bits: of two enumerations, whether each name of the sender has
+    /// the same number here.
     pub fn takes(&self, sender: &Self) -> bool {
+        if let (Some(own), Some(sent)) = (&self.values, &sender.values)
+            && !own.has_all_of(sent)
+        {
+            return false;
+        }
         let Some((low, high)) = self.range else {
             return self.of == sender.of;
         };
         let (least, most) = sender.range.unwrap_or_else(|| sender.of.limits());
         self.of == sender.of && low <= least && most <= high
+    }
+
+    /// Whether a stored value is one of the declaration: within its subrange, with a name where there are names, a whole day as a DATE, within a day
+    /// as a TIME_OF_DAY.
+    pub fn has(&self, stored: u64) -> bool {
+        let of_its_type = match self.of {
+            Elementary::Date => stored.cast_signed().rem_euclid(DAY) == 0,
+            Elementary::TimeOfDay => (0..DAY).contains(&stored.cast_signed()),
+            _ => self.values.is_none() || self.value_name(stored).is_some(),
+        };
+        of_its_type && self.contains(stored)
+    }
+
+    /// The whole number that is nearest to another one, of those that the declaration has.
+    pub fn nearest(&self, wanted: i128) -> i128 {
+        let (least, most) = self.range.unwrap_or_else(|| self.of.limits());
+        let values = self.values.iter().flat_map(|known| &known.values);
+        let values = values.map(|(_, value)| i128::from(*value));
+        let nearest = values.min_by_key(|value| value.abs_diff(wanted));
+        nearest.unwrap_or_else(|| wanted.clamp(least, most))
     }
 
     /// Whether a stored value is within the subrange.
@@ -254,5 +281,63 @@ impl<'a> IntoIterator for &'a Points {
 
     fn into_iter(self) -> Self::IntoIter {
         self.points.iter()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mode(values: &[(&str, i64)]) -> Declared {
+        let values = values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        let known = Enumeration { name: "Mode".to_owned(), values };
+        Declared { values: Some(Arc::new(known)), ..Elementary::Int.into() }
+    }
+
+    #[test]
+    fn a_receiver_has_the_values_of_its_sender_by_name() {
+        let sender = mode(&[("Off", 0), ("Auto", 1)]);
+        assert!(mode(&[("AUTO", 1), ("Off", 0), ("Man", 2)]).takes(&sender));
+        for receiver in [&[("Auto", 0), ("Off", 1)][..], &[("Off", 0)], &[("A", 0), ("B", 1)]] {
+            assert!(!mode(receiver).takes(&sender), "{receiver:?}");
+        }
+        let number = Declared::from(Elementary::Int);
+        assert!(number.takes(&sender) && sender.takes(&number));
+    }
+
+    #[test]
+    fn a_value_is_one_of_the_declaration() {
+        let known = mode(&[("Auto", 5), ("Fault", -1)]);
+        assert!(known.has(5) && known.has(0xffff) && !known.has(0));
+        assert_eq!((known.nearest(0), known.nearest(100)), (-1, 5));
+        let range = Declared { range: Some((4, 9)), ..Elementary::Int.into() };
+        assert!(range.has(4) && !range.has(3));
+        assert_eq!((range.nearest(0), range.nearest(100)), (4, 9));
+        let day = 86_400_000_000_000;
+        let [date, time] = [Elementary::Date, Elementary::TimeOfDay].map(Declared::from);
+        assert!(date.has(day) && date.has(0) && !date.has(5));
+        assert!(time.has(day - 1) && !time.has(day) && !time.has(u64::MAX));
+    }
+
+    /// A value that is kept keeps its name, and not its number.
+    #[test]
+    fn an_input_is_carried_by_the_name_of_its_value() {
+        let points = |declared: Declared| {
+            let mut points = Points::default();
+            points.push_declared("want", declared, 4);
+            points
+        };
+        let old = points(mode(&[("Off", 0), ("Auto", 1)]));
+        let names = ["want".to_owned()];
+        let carried = |new: Declared, stored: u64| {
+            let new = points(new);
+            let mut image = vec![0x7777];
+            let lost = new.carry(&mut image, (&old, &[stored]), &names);
+            lost.is_empty().then(|| image[0])
+        };
+        assert_eq!(carried(mode(&[("Man", 0), ("Off", 1), ("Auto", 2)]), 1), Some(2));
+        assert_eq!(carried(mode(&[("Off", 0)]), 1), None);
+        assert_eq!(carried(mode(&[("Off", 0), ("Auto", 1)]), 7), None);
+        assert_eq!(carried(Elementary::Int.into(), 1), Some(1));
     }
 }

@@ -8,7 +8,7 @@ use crate::operation::{number_text, text_literal};
 use crate::types::{Array, Elementary, Enumeration, Type};
 
 /// Nanoseconds of a day.
-const DAY: u64 = 86_400_000_000_000;
+pub(crate) const DAY: i64 = 86_400_000_000_000;
 
 /// A variable without parts, or such a part of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl Elementary {
     pub fn moment(self, text: &str) -> Option<u64> {
         let text = text.to_ascii_uppercase();
         let stored = number_text::read(self, text.as_bytes());
-        if self == Self::TimeOfDay && stored >= DAY {
+        if self == Self::TimeOfDay && !(0..DAY).contains(&stored.cast_signed()) {
             return None;
         }
         let written = self.text(stored);

@@ -271,6 +271,16 @@ pub struct Enumeration {
     pub values: Vec<(String, i64)>,
 }
 
+impl Enumeration {
+    /// Whether each name of another one has the same number here.
+    pub fn has_all_of(&self, other: &Self) -> bool {
+        other.values.iter().all(|(name, value)| {
+            let mut own = self.values.iter();
+            own.any(|(known, number)| known.eq_ignore_ascii_case(name) && number == value)
+        })
+    }
+}
+
 /// The parts of a structure or of a function block's memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Structure {

@@ -184,7 +184,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         required controller: Kind::Text, "whose";
         key name: Kind::Name, "names it; `<controller>-io` where absent";
         key hold_cycles: count(0, MANY_CYCLES, 3), "cycles for which the last proven outputs are held when no output can be proved";
-        key fail_safe: Kind::Values, "fail-safe values after that, by the name of the output, such as `{ grip = true, heating = 12.5 }`; `false` or 0 for all others";
+        key fail_safe: Kind::Values, "fail-safe values after that, by the name of the output, such as `{ grip = true, heating = 12.5 }`; `false` or 0 for all others, or the value nearest to 0 that the declaration of the output has";
         key ramp: Kind::Values, "change per second of a numeric output on its way to its fail-safe value, such as `{ heating = 5.0 }`; an output without one changes at once";
         key release: word(&RELEASES), "how the outputs are released after a cold start of the program";
         key value_fault: word(&VALUE_FAULTS), "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them";

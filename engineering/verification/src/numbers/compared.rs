@@ -66,7 +66,16 @@ fn add_one(
     let left = number(system, &named.name)?;
     let Compared { comparison, with } = compared;
     let of = system.terms.of(left);
+    let known = system.enumerated.get(&named.name).cloned();
     if let Some(right) = system.number(with) {
+        if let Some(known) = known.as_ref().filter(|known| known.value_named(with).is_some()) {
+            let message = format!("`{with}` is a variable, and a value of {known}");
+            let help = match known.values.as_ref().map_or("", |known| known.name.as_str()) {
+                "" => "give one of them another name".to_owned(),
+                name => format!("write the type in front of the value: `{name}#{with}`"),
+            };
+            return Err((message, help));
+        }
         let other = system.terms.of(right);
         if other != of {
             let message =
@@ -76,9 +85,13 @@ fn add_one(
         system.compare(text, left, *comparison, right);
         return Ok(());
     }
-    let known = system.enumerated.get(&named.name).cloned();
-    let stored = value(&known.unwrap_or(of.into()), with).map_err(|help| {
-        (format!("`{with}` is neither a value of `{}` : {of} nor a number", named.name), help)
+    let declared = known.unwrap_or(of.into());
+    let stored = value(&declared, with).map_err(|help| {
+        let name = &named.name;
+        (
+            format!("`{with}` is no value of `{name}` : {declared}, and no number has this name"),
+            help,
+        )
     })?;
     system.compare_with_value(text, left, *comparison, stored);
     Ok(())
@@ -104,6 +117,11 @@ fn number(system: &System, name: &str) -> Result<Term, (String, String)> {
 fn value(declared: &Declared, text: &str) -> Result<u64, String> {
     typed_value(text, declared).map_err(|help| match declared.of {
         Elementary::Time => "write a duration, such as 1.5s".to_owned(),
+        Elementary::Date => "write a date, such as D#2024-02-29".to_owned(),
+        Elementary::TimeOfDay => "write a time of day, such as TOD#12:34:56".to_owned(),
+        Elementary::DateAndTime => {
+            "write a date and a time, such as DT#2024-02-29-12:34:56".to_owned()
+        }
         _ => help,
     })
 }

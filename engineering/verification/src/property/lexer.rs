@@ -133,6 +133,9 @@ fn number_length(text: &str) -> usize {
 /// A name: letters, digits and underscores, a dot that stands before another such character (`pause.Q`), the index of an element (`step[3].done`), and
 /// the sign of an address in front (`%QX1.1`).
 fn word_length(text: &str) -> usize {
+    if let Some(length) = moment_length(text) {
+        return length;
+    }
     let part = |character: char| character.is_alphanumeric() || character == '_';
     let mut at = usize::from(text.starts_with('%'));
     loop {
@@ -149,6 +152,19 @@ fn word_length(text: &str) -> usize {
             _ => return at,
         };
     }
+}
+
+/// The length of a date, a time of day or both with its type in front: `D#2024-02-29`, `TOD#12:34:56.5`, `DT#2024-02-29-12:34:56`.
+fn moment_length(text: &str) -> Option<usize> {
+    let (of, moment) = text.split_once('#')?;
+    let types = ["D", "DATE", "TOD", "TIME_OF_DAY", "DT", "DATE_AND_TIME"];
+    if !types.iter().any(|known| known.eq_ignore_ascii_case(of)) {
+        return None;
+    }
+    let is_part = |sign: char| sign.is_ascii_digit() || "-:.".contains(sign);
+    let end = moment.find(|sign| !is_part(sign)).unwrap_or(moment.len());
+    let moment = moment[..end].trim_end_matches(|sign: char| !sign.is_ascii_digit());
+    Some(of.len() + 1 + moment.len()).filter(|_| !moment.is_empty())
 }
 
 /// The length of `[3]` or `[-1,2]`; 0 of other brackets, such as those of `A[p U q]`.

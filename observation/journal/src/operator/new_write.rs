@@ -129,11 +129,10 @@ pub fn new_write(
     };
     let stored = match request.value {
         RequestedValue::Text(_) => typed_value(&text, declared).map_err(invalid)?,
-        // Of an enumeration a number without a name is no value.
-        RequestedValue::Stored(_) if declared.values.is_some() => {
-            typed_value(text.trim_matches('"'), declared).map_err(invalid)?
+        RequestedValue::Stored(stored) if declared.has(declared.limited(stored)) => stored,
+        RequestedValue::Stored(_) => {
+            return Err(invalid(format!("the input is {declared}, which does not have it")));
         }
-        RequestedValue::Stored(stored) => stored,
     };
     let value = PointValue::new(of.bits(), stored);
     place.check(value).map_err(|mismatch| match mismatch {

@@ -219,6 +219,9 @@ impl Model {
             let missing = step.driven.as_ref().and_then(|driven| driven.missing);
             let reason = match missing {
                 Some(missing) => crate::describe::missing_text(missing),
+                None if history.is_replaced(step.moment) => {
+                    "an online change has replaced its program, and a view explains the program with which the run began"
+                }
                 None => "the journal does not contain the start of its history",
             };
             ViewError::NoState {

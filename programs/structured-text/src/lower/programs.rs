@@ -384,7 +384,7 @@ impl<'a> Lowering<'a> {
                     format!("the output `{name}` is {found}: only the program itself can read it")
                 }
             };
-            let help = "a point is a number, a bit or a time; declare each part as a variable of its own, or use VAR";
+            let help = "a point is a number, a bit, a time or a value of an enumeration, or one of up to 1,000 elements of an array of these; declare each part as a variable of its own, or use VAR";
             self.warn("U1055", message, variable.span.clone(), help);
             return;
         }

@@ -407,6 +407,14 @@ impl<'a> Lowering<'a> {
                 self.error("U1036", message, value_name.span());
                 return None;
             };
+            let enumeration = &self.program.enumerations[id.0 as usize];
+            let mut known = enumeration.values.iter();
+            if known.any(|(known, _)| known.eq_ignore_ascii_case(value_name.as_str())) {
+                let message = format!("the value `{value_name}` is declared twice");
+                let help = "remove or rename one of them";
+                self.error_with("U1042", message, value_name.span(), help);
+                continue;
+            }
             let enumeration = &mut self.program.enumerations[id.0 as usize];
             Arc::make_mut(enumeration).values.push((value_name.as_str().to_owned(), value));
             let known = self.enumerators.entry(value_name.key()).or_default();

@@ -104,13 +104,18 @@ fn different_point(before: &Code, after: &Code) -> Option<String> {
     for (side, old, new) in sides {
         let (old, new): (Vec<_>, Vec<_>) = (old.iter().collect(), new.iter().collect());
         for place in 0..old.len().max(new.len()) {
-            let is_equal = match (old.get(place), new.get(place)) {
-                (Some(one), Some(other)) => {
-                    (&one.name, one.of, one.bit, one.range)
-                        == (&other.name, other.of, other.bit, other.range)
-                }
-                _ => false,
-            };
+            let both = old.get(place).zip(new.get(place));
+            let is_equal = both.is_some_and(|(one, other)| {
+                (&one.name, one.of, one.bit, one.range)
+                    == (&other.name, other.of, other.bit, other.range)
+            });
+            // What an operator, a signal or a device has in the image keeps its number.
+            if let Some((one, other)) = both.filter(|_| is_equal)
+                && !other.declared().takes(&one.declared())
+            {
+                let name = &other.name;
+                return Some(format!("values of {side} `{name}` have other names or numbers"));
+            }
             if !is_equal {
                 let point = new.get(place).or(old.get(place))?;
                 return Some(format!("{side} `{}` of type {}", point.name, point.of));

@@ -20,8 +20,6 @@ pub(super) struct Signals {
 pub(super) struct Signal {
     pub(super) name: String,
     pub(super) declared: Declared,
-    /// The least and the greatest value that a whole number means something at.
-    pub(super) limits: (i128, i128),
     /// What the program says about it: its address and its comment.
     pub(super) note: Option<String>,
 }
@@ -54,25 +52,15 @@ impl Signals {
 
 impl Signal {
     fn point(name: &str, declared: Declared, variable: Option<&Variable>) -> Self {
-        let values = || {
-            let known = declared.values.as_ref()?.values.iter();
-            let values = known.map(|(_, value)| i128::from(*value));
-            Some((values.clone().min()?, values.max()?))
-        };
-        let limits = declared.range.or_else(values).unwrap_or_else(|| declared.of.limits());
         let (address, description) = variable.map_or((None, None), |variable| {
             (variable.address.as_deref(), variable.description.as_deref())
         });
-        Self { name: name.to_owned(), declared, limits, note: note(address, description) }
+        Self { name: name.to_owned(), declared, note: note(address, description) }
     }
 
     /// The value that is nearest to a whole number.
     pub(super) fn nearest(&self, wanted: i128) -> i128 {
-        let (least, most) = self.limits;
-        let nearest = wanted.clamp(least, most);
-        let values = self.declared.values.iter().flat_map(|known| &known.values);
-        let values = values.map(|(_, value)| i128::from(*value));
-        values.min_by_key(|value| value.abs_diff(wanted)).unwrap_or(nearest)
+        self.declared.nearest(wanted)
     }
 
     pub(super) fn is_bit(&self) -> bool {

@@ -24,6 +24,11 @@ pub(super) fn values(
     };
     let width = interface.outputs.width();
     let mut image = Image::zero(width.min(understudy_wire::MAXIMUM_IMAGE_BITS));
+    // No value is driven that the declaration of an output does not have.
+    let fits = width <= understudy_wire::MAXIMUM_IMAGE_BITS;
+    for output in interface.outputs.iter().filter(|_| fits) {
+        output.set(image.words_mut(), output.declared().nearest(0) as u64);
+    }
     for (output, name, value) in outputs(member, interface, entries, diagnostics) {
         match stored_value(value, &output.declared()) {
             Ok(stored) => output.set(image.words_mut(), stored),

@@ -381,3 +381,29 @@ fn settings_that_need_a_stop_are_named_as_in_the_file() {
         assert_eq!(reasons(from, &to), expected, "{to}");
     }
 }
+
+/// What an operator, a signal or a device has in an image is a number: where it would be another value, the change needs a stop.
+#[test]
+fn values_of_points_keep_their_numbers() {
+    let text = |values: &str| {
+        format!(
+            "TYPE Mode : ({values}); END_TYPE\nPROGRAM one\n  VAR_INPUT want : Mode; END_VAR\n  VAR_OUTPUT is : Mode; END_VAR\n  is := want;\nEND_PROGRAM\n"
+        )
+    };
+    let before = text("Off, Auto, Man");
+    for (values, fits) in [
+        ("Off, Auto, Man", true),
+        ("off, auto, man, Extra", true),
+        ("Man, Off, Auto", false),
+        ("Off, Auto", false),
+        ("Off, Auto, Hand", false),
+    ] {
+        let change = change("one.st", &before, &text(values));
+        assert_eq!(change.is_ok(), fits, "{values}");
+        if let Err(reasons) = change {
+            let told: Vec<String> = reasons.iter().map(ToString::to_string).collect();
+            let expected = "the inputs or outputs of `one` differ: values of input `want` have other names or numbers";
+            assert_eq!(told, [expected], "{values}");
+        }
+    }
+}
