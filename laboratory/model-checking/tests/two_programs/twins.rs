@@ -18,7 +18,7 @@ fn check_wired(wiring: Wiring, budget: Budget, states: usize) {
 
 #[test]
 fn one_fault_in_four_cycles() {
-    check_pair(Budget { cuts: 1, ..ONE }, 41_346);
+    check_pair(Budget { cuts: 1, ..ONE }, 41_541);
 }
 
 /// All that is not a loss, in two cycles.
@@ -26,25 +26,25 @@ const TWO: Budget = Budget { crashes: 2, stops: 2, cuts: 1, total: 2, cycles: 2,
 
 #[test]
 fn two_faults_in_one_cycle() {
-    check_pair(Budget { losses: 2, cycles: 1, ..TWO }, 163_880);
+    check_pair(Budget { losses: 2, cycles: 1, ..TWO }, 163_886);
 }
 
 #[test]
 #[ignore = "it takes a minute"]
 fn two_crashes_or_stops_in_two_cycles() {
-    check_pair(Budget { cuts: 0, ..TWO }, 629_596);
+    check_pair(Budget { cuts: 0, ..TWO }, 640_127);
 }
 
 #[test]
 #[ignore = "it takes two minutes"]
 fn a_cut_and_a_crash_or_a_stop_in_two_cycles() {
-    check_pair(Budget { crashes: 1, stops: 1, ..TWO }, 1_193_208);
+    check_pair(Budget { crashes: 1, stops: 1, ..TWO }, 1_207_869);
 }
 
 #[test]
 #[ignore = "it takes two minutes"]
 fn a_loss_and_another_fault_in_two_cycles() {
-    check_pair(Budget { losses: 2, crashes: 1, stops: 1, ..TWO }, 1_409_406);
+    check_pair(Budget { losses: 2, crashes: 1, stops: 1, ..TWO }, 1_425_296);
 }
 
 /// Both wired to the plant: what one of the two drives next to the author is what the author drove in one of the last six cycles, or nothing.
@@ -52,7 +52,7 @@ const PARALLEL: Wiring = Wiring::Parallel { discrepancy_cycles: 2 };
 
 #[test]
 fn one_fault_of_two_that_are_both_wired() {
-    check_wired(PARALLEL, Budget { cuts: 1, ..ONE }, 43_560);
+    check_wired(PARALLEL, Budget { cuts: 1, ..ONE }, 43_760);
 }
 
 #[test]
@@ -63,5 +63,5 @@ fn two_faults_of_two_that_are_both_wired() {
 #[test]
 #[ignore = "it takes a minute"]
 fn two_crashes_or_stops_of_two_that_are_both_wired() {
-    check_wired(PARALLEL, Budget { cuts: 0, ..TWO }, 680_033);
+    check_wired(PARALLEL, Budget { cuts: 0, ..TWO }, 681_165);
 }
