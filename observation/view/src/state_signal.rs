@@ -266,6 +266,8 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
     let interface = &controller.interface;
     let points = interface.inputs.iter().chain(interface.outputs.iter());
     let own: BTreeSet<u64> = points.map(|point| u64::from(point.slot)).collect();
+    let names: BTreeSet<&str> = interface.inputs.names().chain(interface.outputs.names()).collect();
+    let is_point = |name: &str| names.contains(name);
     let mut signals = Vec::new();
     for variable in &typed.variables {
         let end = 64 * (u64::from(variable.slot) + variable.of.slots());
@@ -276,6 +278,8 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
             let bits = declared.as_ref().map_or(64, |declared| u64::from(declared.of.bits()));
             if let Some((part, declared)) = part.zip(declared)
                 && !own.contains(&(address / 64))
+                // Elements of an array of points have slots of their own besides.
+                && !is_point(&part.name)
             {
                 let is_whole = part.name == variable.name;
                 signals.push(StateSignal {
