@@ -79,6 +79,7 @@ const numberText = (input, value) => valueText(typeof value === "number" ? value
 const withUnit = (input, text) => `${text} ${unitOf(input)}`.trim();
 // The value of a request as it is shown.
 const wordsOf = (input, text) => (input.type === "BOOL" ? (text === "true" ? "1" : "0") : withUnit(input, text.replace(/ms$/, "")));
+const MOMENTS = ["DATE", "TIME_OF_DAY", "DATE_AND_TIME"];
 const isWhole = (input) => !["REAL", "LREAL", "TIME"].includes(input.type);
 
 // A control: what it writes is decided by its kind; value, answer and confirmation are the same for all.
@@ -136,7 +137,7 @@ function makeControl(program, input, index) {
     say("", "");
     yes.focus();
   };
-  const setter = (kind === "pulse" ? makePulse : kind === "level" ? makeLevel : input.values ? makeChoice : makeSetpoint)(parts, write, say);
+  const setter = (kind === "pulse" ? makePulse : kind === "level" ? makeLevel : input.values ? makeChoice : MOMENTS.includes(input.type) ? makeMoment : makeSetpoint)(parts, write, say);
   const refresh = () => {
     const shown = kind === "setpoint" ? withUnit(input, numberText(input, parts.sampled)) : valueText(parts.sampled);
     setText(value, `${shown}${parts.busy ? " …" : ""}`);
@@ -189,36 +190,46 @@ function makeLevel(parts, write) {
   return { element: el("div", { class: "control-setter" }, button), targets: [button], focus: () => button.focus(), show };
 }
 
-// The values of an enumeration. While a person chooses, the list does not follow the sampled value.
+// The values of an enumeration within the limits, in the order of their numbers.
 function makeChoice(parts, write) {
   const { key, input } = parts;
   const numbers = Object.entries(input.values).map(([number, name]) => [Number(number), name]);
-  const numberOf = (name) => numbers.find(([, known]) => known === name)?.[0];
-  const [low, high] = [input.operator.low, input.operator.high].map(numberOf);
+  const [low, high] = [input.operator.low, input.operator.high].map((name) => numbers.find(([, known]) => known === name)?.[0]);
   const allowed = numbers.filter(([number]) => number >= low && number <= high).sort(([one], [other]) => one - other);
-  let chosen = null;
+  const list = el("select", { class: "entry", "aria-labelledby": `${key}-title` }, allowed.map(([, name]) => el("option", { value: name }, name)));
+  return makeField(parts, write, list, "");
+}
+
+// A date or a time of day, as it is shown.
+function makeMoment(parts, write) {
+  const { low, high } = parts.input.operator;
+  const entry = el("input", { type: "text", class: "entry moment", size: "20", autocomplete: "off", "aria-labelledby": `${parts.key}-title` });
+  return makeField(parts, write, entry, `from ${low} to ${high}`);
+}
+
+// A list or a text with a button. While a person chooses or types, it does not follow the sampled value.
+function makeField(parts, write, field, limits) {
+  let isTouched = false;
   let isBlocked = true;
-  const list = el("select", { class: "entry", "aria-labelledby": `${key}-title`, change: () => { chosen = list.value; refresh(); } },
-    el("option", { value: "" }, "choose …"), allowed.map(([, name]) => el("option", { value: name }, name)));
   const button = el("button", { type: "submit" }, "Write");
-  const form = el("form", { class: "control-setter", submit: (event) => {
+  const form = el("form", { class: "control-setter", novalidate: true, submit: (event) => {
     event.preventDefault();
     if (!button.disabled) {
-      write(list.value);
+      write(field.value.trim());
     }
-  } }, list, button);
+  }, input: () => { isTouched = true; refresh(); } }, field, button, el("span", { class: "soft" }, limits));
   const refresh = () => {
-    if (chosen === null) {
-      list.value = numberOf(parts.sampled) === undefined ? "" : parts.sampled;
+    if (!isTouched && field.value !== (parts.sampled ?? "")) {
+      field.value = parts.sampled ?? "";
     }
-    list.disabled = isBlocked;
-    button.disabled = isBlocked || list.value === "";
+    field.disabled = isBlocked;
+    button.disabled = isBlocked || field.value.trim() === "";
   };
   const show = (blocked) => {
     isBlocked = blocked;
     refresh();
   };
-  return { element: form, targets: [list, button], focus: () => list.focus(), show, written: () => { chosen = null; } };
+  return { element: form, targets: [field, button], focus: () => field.focus(), show, written: () => { isTouched = false; } };
 }
 
 // An entry and a slider between the limits. While a person types, the entry does not follow the sampled value.
