@@ -135,6 +135,10 @@ pub(super) fn value(
     }
 }
 
+/// What is done where two enumerations have other numbers for their names.
+pub(super) const OTHER_NUMBERS: &str =
+    "give each name of the sender the same number in the enumeration of the receiver";
+
 /// The least and the greatest value of an enumeration, as stored.
 fn ends(point: &Point) -> Option<(u64, u64)> {
     let numbers = || point.values.iter().flat_map(|known| &known.values).map(|(_, value)| *value);
@@ -357,6 +361,7 @@ impl Signal<'_> {
             let message =
                 format!("`{from}` is {sent}, and the input `{}` is {received}", point.name);
             let help = match sent.of == received.of {
+                true if sent.values.is_some() => OTHER_NUMBERS,
                 true => "declare the output with a range within that of the input",
                 false => "declare both with the same type",
             };

@@ -15,7 +15,7 @@ use understudy_wire::ProgramId;
 
 use super::Member;
 use super::follows;
-use super::inputs::names_of_valid;
+use super::inputs::{OTHER_NUMBERS, names_of_valid};
 use super::ladders::Ladders;
 use super::limits::too_wide;
 use super::names::{Names, find_controller};
@@ -260,6 +260,7 @@ pub(crate) fn of_other_type(
 ) -> Diagnostic {
     let message = format!("{receiver} is {received}, and {sender}, which drives it, is {sent}");
     let help = match sent.of == received.of {
+        true if sent.values.is_some() => OTHER_NUMBERS.to_owned(),
         true => format!("declare the sender as {received}, or the receiver as {sent}"),
         false => "declare both with one type".to_owned(),
     };
