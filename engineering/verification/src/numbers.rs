@@ -19,7 +19,7 @@ use std::collections::HashSet;
 use understudy_bits::{Derivation, Inexact, Meaning, Member, Node, System, Unsupported, Variable};
 use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
-use understudy_typed::{Elementary, Program};
+use understudy_typed::Program;
 
 use crate::program::{Answer as CircuitAnswer, Bounds, OutputFinding, Subject, of_some_run};
 use crate::property::{Asked, Formula, Path, Property};
@@ -160,13 +160,7 @@ impl Model {
     /// # Errors
     /// Every name that is no BOOL of the programs, and every comparison that is none (U0435).
     pub fn resolve(&self, property: &Property) -> Result<Resolved, Vec<Diagnostic>> {
-        let System { inputs, shown, terms, .. } = &self.system;
-        let is_number = |name: &str| {
-            let input = inputs.iter().find(|input| input.name == name).map(|input| input.of);
-            let signal = || shown.iter().find(|(known, _)| known == name);
-            let of = input.or_else(|| Some(terms.of(signal()?.1)));
-            of.is_some_and(|of| of != Elementary::Bool)
-        };
+        let is_number = |name: &str| compared::type_of(&self.system, name).is_some();
         resolve(&property.formula, self.circuit()).map_err(|unknown| {
             let told =
                 unknown.into_iter().map(|named| match self.refused.get(&named.to_string()) {

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::naming::DAY;
+use crate::operation::number_text::DAY;
 use crate::types::{Elementary, Enumeration};
 
 /// An input or output of a program.

@@ -7,9 +7,6 @@ use crate::image::Declared;
 use crate::operation::{number_text, text_literal};
 use crate::types::{Array, Elementary, Enumeration, Type};
 
-/// Nanoseconds of a day.
-pub(crate) const DAY: i64 = 86_400_000_000_000;
-
 /// A variable without parts, or such a part of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
@@ -63,13 +60,11 @@ impl Elementary {
     pub fn moment(self, text: &str) -> Option<u64> {
         let text = text.to_ascii_uppercase();
         let stored = number_text::read(self, text.as_bytes());
-        if self == Self::TimeOfDay && !(0..DAY).contains(&stored.cast_signed()) {
-            return None;
-        }
         let written = self.text(stored);
         let (_, bare) = written.split_once('#')?;
         let keyword = format!("{self}#{bare}");
-        [written.as_str(), bare, &keyword].contains(&text.as_str()).then_some(stored)
+        let is_written = [written.as_str(), bare, &keyword].contains(&text.as_str());
+        (is_written && Declared::from(self).has(stored)).then_some(stored)
     }
 }
 

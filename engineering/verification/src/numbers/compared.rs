@@ -45,13 +45,18 @@ pub(super) fn diagnostic(named: &Named, (message, help): &(String, String)) -> D
     Diagnostic::error("U0435", message.clone(), named.span.clone()).with_help(help.clone())
 }
 
-/// What is told of a number that stands where a BOOL does.
-pub(super) fn number_alone(system: &System, named: &Named) -> Option<Diagnostic> {
+/// The type of the number of this name; nothing where there is none.
+pub(super) fn type_of(system: &System, name: &str) -> Option<Elementary> {
     let inputs = system.inputs.iter().map(|input| (&input.name, input.of));
     let shown = system.shown.iter().map(|(name, term)| (name, system.terms.of(*term)));
-    let (name, of) = inputs.chain(shown).find(|(name, of)| {
-        **name == named.name && *of != Elementary::Bool && named.compared.is_none()
-    })?;
+    let mut numbers = inputs.chain(shown).filter(|(_, of)| *of != Elementary::Bool);
+    numbers.find(|(known, _)| *known == name).map(|(_, of)| of)
+}
+
+/// What is told of a number that stands where a BOOL does.
+pub(super) fn number_alone(system: &System, named: &Named) -> Option<Diagnostic> {
+    let name = &named.name;
+    let of = type_of(system, name).filter(|_| named.compared.is_none())?;
     let message = format!("`{name}` is {of}, and stands where a BOOL does");
     let help = format!("compare it: `{name} > …`, `{name} = …`");
     Some(Diagnostic::error("U0435", message, named.span.clone()).with_help(help))

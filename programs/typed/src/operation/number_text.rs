@@ -14,7 +14,8 @@ use crate::operation::real::Float;
 use crate::types::Elementary;
 
 const SECOND: i64 = 1_000_000_000;
-const DAY: i64 = 86_400 * SECOND;
+/// Nanoseconds of a day.
+pub(crate) const DAY: i64 = 86_400 * SECOND;
 
 /// Parts of a duration: the unit and its nanoseconds.
 const UNITS: [(&str, i64); 7] = [
