@@ -245,7 +245,7 @@ impl<'s> Log<'s> {
     }
 }
 
-/// How many scans of so many operations are compared.
+/// How many scans are compared, by the operations of a scan.
 fn scans(operations: usize) -> usize {
     (OPERATIONS / operations.max(1)).clamp(LEAST, SCANS)
 }

@@ -29,7 +29,7 @@ pub fn typed_value(text: &str, declared: &Declared) -> Result<u64, String> {
         (Elementary::Bool, _) => other(),
         _ if of.is_time() => other(),
         _ if of.is_real() => text.parse().map_or_else(|_| other(), Constant::Number),
-        // A whole number of 64 bits is none of a file.
+        // A file has no whole numbers beyond 63 bits.
         _ => match whole(&word) {
             Some(number) => return stored_number(number, declared),
             None => other(),

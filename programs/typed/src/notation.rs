@@ -17,7 +17,7 @@ impl Declared {
         self.value_name(stored).map_or_else(|| self.of.write(stored), str::to_owned)
     }
 
-    /// The stored value of a text of a file of scans; `None` where it is none of this declaration. A number beyond a subrange is one.
+    /// The stored value of a text of a file of scans; `None` where the declaration has no such value. Numbers outside a subrange are read.
     pub fn read(&self, text: &str) -> Option<u64> {
         self.value_named(text).or_else(|| self.of.read(text))
     }

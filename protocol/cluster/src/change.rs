@@ -300,7 +300,7 @@ impl Cluster {
     /// The same cluster with the programs and settings of one of the two configurations of a change, as if its file named them.
     ///
     /// # Errors
-    /// A text that is read as another program here, and settings that are none of its program.
+    /// A text that is read as another program here, and settings that do not fit its program.
     pub fn changed(&self, texts: &ChangeTexts, to: ConfigurationHash) -> Result<Self, ChangeError> {
         let mut cluster = self.clone();
         let mut programs = cluster.programs.to_vec();

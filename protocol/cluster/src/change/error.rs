@@ -30,7 +30,7 @@ pub enum ChangeError {
         /// Name of the controller.
         program: String,
     },
-    /// The settings of a remote I/O are none of the outputs of its program.
+    /// The settings of a remote I/O do not fit the outputs of its program.
     #[error("the settings of the remote I/O of `{program}` in the change do not fit its program")]
     NoSettings {
         /// Name of the controller.

@@ -91,7 +91,7 @@ impl FallbackText {
         }
     }
 
-    /// It for a program with these outputs; nothing where it is none of them, or beyond the bounds of the cluster file.
+    /// The settings for a program with these outputs; nothing where they do not fit them, or are beyond the bounds of the cluster file.
     pub(super) fn read(&self, outputs: &Points) -> Option<Fallback> {
         let Self {
             hold_cycles,
