@@ -22,9 +22,6 @@ pub(crate) struct Arguments {
     /// Changes in all
     #[arg(long, default_value_t = 1000)]
     count: u32,
-    /// The `understudy` binary; default: the one next to this program
-    #[arg(long, value_name = "FILE")]
-    program: Option<PathBuf>,
     /// Folder for the files of the cell; it is emptied
     #[arg(long, value_name = "DIR", default_value = "changes-bench")]
     folder: PathBuf,
@@ -116,10 +113,6 @@ struct Row {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let program = match &arguments.program {
-        Some(program) => program.clone(),
-        None => crate::spares::sibling()?,
-    };
     let mut random = Pcg64Mcg::seed_from_u64(arguments.seed);
     let mut rows = Vec::new();
     let _ = std::fs::remove_dir_all(&arguments.folder);
@@ -128,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         if count > 0 {
             let folder = arguments.folder.join(number.to_string());
             let loses = of == Target::AnyWithLoss;
-            let plant = Plant::start(&program, &folder, count, loses)?;
+            let plant = Plant::start(&folder, count, loses)?;
             console.note(&format!("{count} changes, {} killed", of.words()));
             rows.push(row(of, count, plant, &mut random, console)?);
         }

@@ -1,11 +1,36 @@
-//! The processes of a benchmark, each a member of one cluster: this program again, with its part as an argument.
+//! The processes of a benchmark: this program again, with its part as an argument, or as the `understudy` command.
 
 use std::io;
-use std::process::Child;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, Command};
 use std::sync::Arc;
 
+use understudy::{Answer, Status};
 use understudy_bus::{BusError, Endpoints, Guard, Peer};
 use understudy_seal::{ClusterSecret, KEY_BYTES, Opener, Seal, Title};
+
+/// The name by which this program is the `understudy` command.
+const NAME: &str = "understudy";
+
+/// Whether this process was started by [`understudy_command`].
+pub(crate) fn is_understudy() -> bool {
+    std::env::args_os().next().is_some_and(|name| name == Path::new(NAME))
+}
+
+/// The `understudy` command of this build: what is measured is never another version of the project than what judges it.
+pub(crate) fn understudy_command() -> Result<Command, Answer> {
+    let program = std::env::current_exe().map_err(|error| {
+        Answer::failed(
+            Status::Failed,
+            "U0604",
+            format!("cannot find the executable of this program: {error}"),
+        )
+    })?;
+    let mut command = Command::new(program);
+    command.arg0(NAME);
+    Ok(command)
+}
 
 /// What the system refused.
 pub(crate) fn refused(what: &'static str) -> impl FnOnce(io::Error) -> BusError {

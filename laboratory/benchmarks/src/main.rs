@@ -107,6 +107,9 @@ impl Benchmark {
 }
 
 fn main() -> ExitCode {
+    if children::is_understudy() {
+        return understudy::main();
+    }
     let call = match CommandLine::try_parse() {
         Ok(call) => call,
         Err(error) => return misused(&error),

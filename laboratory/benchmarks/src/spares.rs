@@ -7,8 +7,8 @@ mod witness;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::path::PathBuf;
+use std::process::{Child, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -21,6 +21,8 @@ use understudy::{Answer, Console, Status};
 use group::Group;
 pub(crate) use group::failed;
 use witness::Counts;
+
+use crate::children::understudy_command;
 
 /// Kill a station and then the understudy of its group, with a spare that several groups share
 #[derive(Debug, Args)]
@@ -40,9 +42,6 @@ pub(crate) struct Arguments {
     /// State of one program of each group in KiB; the press cell where absent
     #[arg(long)]
     state: Option<usize>,
-    /// The `understudy` binary; default: the one next to this program
-    #[arg(long, value_name = "FILE")]
-    program: Option<PathBuf>,
     /// Folder for the files of the groups; it is emptied
     #[arg(long, value_name = "DIR", default_value = "spares-bench")]
     folder: PathBuf,
@@ -97,10 +96,6 @@ struct Found {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let program = match &arguments.program {
-        Some(program) => program.clone(),
-        None => sibling()?,
-    };
     let _ = std::fs::remove_dir_all(&arguments.folder);
     let mut random = Pcg64Mcg::seed_from_u64(arguments.seed);
     let mut groups = Vec::new();
@@ -108,9 +103,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         let folder = arguments.folder.join(format!("line-{number}"));
         let name = format!("line-{number}");
         let real_time = !arguments.no_real_time;
-        groups.push(Group::start(&program, &folder, &name, arguments.state, real_time)?);
+        groups.push(Group::start(&folder, &name, arguments.state, real_time)?);
     }
-    let mut spare = Spare::start(&program, arguments, &groups)?;
+    let mut spare = Spare::start(arguments, &groups)?;
     for group in &groups {
         group.until(PATIENCE, |counts| counts.is_protected == Some(true))?;
         spare.until(&format!("{}: watches it", group.name), 1)?;
@@ -240,12 +235,6 @@ fn answer(found: &Found) -> Answer {
     Answer::done(text, found).with_status(status)
 }
 
-/// `understudy` in the folder of this program.
-pub(crate) fn sibling() -> Result<PathBuf, Answer> {
-    let own = std::env::current_exe().map_err(|error| failed("this program", &error))?;
-    Ok(own.with_file_name("understudy"))
-}
-
 /// The spare as a process, and what it has reported.
 struct Spare {
     process: Child,
@@ -256,7 +245,7 @@ struct Spare {
 }
 
 impl Spare {
-    fn start(program: &Path, arguments: &Arguments, groups: &[Group]) -> Result<Self, Answer> {
+    fn start(arguments: &Arguments, groups: &[Group]) -> Result<Self, Answer> {
         let mut plant = String::new();
         let mut slots = Vec::new();
         for Group { name, .. } in groups {
@@ -282,7 +271,7 @@ impl Spare {
             std::os::unix::fs::symlink(members, keys.join(name))
                 .map_err(|error| failed("keys", &error))?;
         }
-        let mut command = Command::new(program);
+        let mut command = understudy_command()?;
         command.arg("spare").arg(&file).args(["--name", "spare-1", "--keys"]).arg(&keys);
         let journals = arguments.folder.join("journals");
         command.arg("--ends-with-parent").arg("--journals").arg(&journals);

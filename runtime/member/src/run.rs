@@ -236,8 +236,12 @@ pub fn restart_for_zenoh((variable, value): (&str, &str)) {
     }
     if let Ok(program) = std::env::current_exe() {
         // It only comes back where it fails; then Zenoh has more threads than it needs, and works.
-        let arguments = std::env::args_os().skip(1);
-        let error = Command::new(program).args(arguments).env(variable, value).exec();
+        let mut arguments = std::env::args_os();
+        let mut again = Command::new(program);
+        if let Some(name) = arguments.next() {
+            again.arg0(name);
+        }
+        let error = again.args(arguments).env(variable, value).exec();
         tracing::warn!(%error, "the program was not started again with fewer threads for Zenoh");
     }
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command as Process, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
@@ -14,6 +14,7 @@ use understudy::{Answer, Status};
 use understudy_journal::{Command, Commander, OperatorAction};
 use understudy_wire::Member;
 
+use crate::children::understudy_command;
 use crate::spares::failed;
 
 /// Cycles of a run for each change, at most: it ends by itself where this program was killed.
@@ -53,7 +54,6 @@ pub(super) struct Totals {
 }
 
 pub(super) struct Plant {
-    program: PathBuf,
     folder: PathBuf,
     run: PathBuf,
     laboratory: Child,
@@ -83,12 +83,7 @@ fn program(variant: usize) -> String {
 }
 
 impl Plant {
-    pub(super) fn start(
-        program_file: &Path,
-        folder: &Path,
-        changes: u32,
-        loses: bool,
-    ) -> Result<Self, Answer> {
+    pub(super) fn start(folder: &Path, changes: u32, loses: bool) -> Result<Self, Answer> {
         for variant in 0..VARIANTS.len() {
             let folder = folder.join(variant.to_string());
             let [old, new] = [1 - variant, variant].map(|variant| VARIANTS[variant].0);
@@ -103,7 +98,7 @@ impl Plant {
         let folder =
             fs::canonicalize(folder).map_err(|error| failed("the folder of the cell", &error))?;
         let runs = folder.join("runs");
-        let mut command = Process::new(program_file);
+        let mut command = understudy_command()?;
         command.arg("lab").arg(folder.join("0/cluster.toml")).arg("--out").arg(&runs);
         let cycles = (CYCLES * u64::from(changes) + MORE_CYCLES).to_string();
         command.args(["--cycles", &cycles, "--allow-commands"]);
@@ -131,15 +126,7 @@ impl Plant {
         let run = fs::canonicalize(runs.join("latest"));
         let run = run.map_err(|error| failed("the run", &error))?;
         let commander = Commander::of_run(run.clone());
-        Ok(Self {
-            program: program_file.to_owned(),
-            folder,
-            run,
-            laboratory,
-            commander,
-            current: 0,
-            last_words: String::new(),
-        })
+        Ok(Self { folder, run, laboratory, commander, current: 0, last_words: String::new() })
     }
 
     pub(super) fn directory(&self) -> String {
@@ -154,7 +141,7 @@ impl Plant {
     /// Begins a step of the change to the other variant.
     pub(super) fn change(&self, step: &str) -> Result<Tool, Answer> {
         let file = |variant: usize| self.folder.join(format!("{variant}/cluster.toml"));
-        let mut command = Process::new(&self.program);
+        let mut command = understudy_command()?;
         command.arg("change").arg(file(self.current)).arg(file(1 - self.current));
         command.arg(step).arg("--out").arg(self.folder.join("runs"));
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
@@ -207,7 +194,7 @@ impl Plant {
     pub(super) fn wait_until_protected(&self) -> Result<(), Answer> {
         let begun = Instant::now();
         loop {
-            let mut command = Process::new(&self.program);
+            let mut command = understudy_command()?;
             command.arg("top").arg(&self.run).args(["--json", "--once"]).stdin(Stdio::null());
             let output = command.output().map_err(|error| failed("understudy top", &error))?;
             let document: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -14,6 +14,7 @@ use understudy_simulator::Referee;
 use understudy_wire::{Member, ProgramId, StationId};
 
 use super::witness::{self, Counts};
+use crate::children::understudy_command;
 
 const CLUSTER: &str = include_str!("../../../../examples/shared-spare/line-1/cluster.toml");
 const ROBOT: &str = include_str!("../../../../examples/shared-spare/line-1/robot.ladder");
@@ -109,7 +110,6 @@ pub(crate) fn failed(what: &str, error: &dyn std::fmt::Display) -> Answer {
 pub(super) struct Group {
     pub(super) name: String,
     pub(super) folder: PathBuf,
-    program: PathBuf,
     real_time: bool,
     cluster: Cluster,
     processes: BTreeMap<String, Child>,
@@ -122,7 +122,6 @@ pub(super) struct Group {
 impl Group {
     /// Writes the files of a group, issues its keys, and starts its members.
     pub(super) fn start(
-        program: &Path,
         folder: &Path,
         name: &str,
         state: Option<usize>,
@@ -163,7 +162,6 @@ impl Group {
         let mut group = Self {
             name: name.to_owned(),
             folder: folder.to_owned(),
-            program: program.to_owned(),
             real_time,
             processes: BTreeMap::new(),
             counts: cluster.controllers().iter().map(|_| Arc::default()).collect(),
@@ -182,7 +180,7 @@ impl Group {
     fn issue_keys(&self) -> Result<(), Answer> {
         let (file, keys) = (self.folder.join("cluster.toml"), self.folder.join("keys"));
         for arguments in [&["init"][..], &["issue", "--viewer", "spare-1"]] {
-            let mut command = Command::new(&self.program);
+            let mut command = understudy_command()?;
             command.arg("keys").args(arguments).arg(&file).arg("--folder").arg(&keys);
             let done = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
             let done = done.map_err(|error| failed("keys", &error))?;
@@ -200,7 +198,7 @@ impl Group {
             Member::RemoteIo(_) | Member::Twin(_) => "remote-io",
             Member::Plant(_) => "plant",
         };
-        let mut command = Command::new(&self.program);
+        let mut command = understudy_command()?;
         command.arg(kind).arg(self.folder.join("cluster.toml")).args(["--name", &name]);
         command.arg("--keys").arg(self.folder.join("keys/members").join(&name));
         command.arg("--ends-with-parent");
