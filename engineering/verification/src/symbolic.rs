@@ -27,6 +27,13 @@ pub(crate) use model::Cone;
 pub(crate) use trace::rows;
 pub use trace::{ScanRow, Trace};
 
+/// Nodes for each register of functions that are usual.
+const USUAL: usize = 200;
+
+/// Nodes of functions that are small however few registers they are of, and of those that are large however many.
+const SMALL_FUNCTIONS: usize = 1 << 15;
+const LARGE_FUNCTIONS: usize = 1 << 17;
+
 /// A property whose signals are known to be those of a circuit, by their number in it.
 pub type Resolved = Formula<Signal>;
 
@@ -67,6 +74,19 @@ pub enum Verdict {
     Holds(Option<Trace>),
     /// It does not hold; the scans show why, where scans can show it.
     Fails(Option<Trace>),
+}
+
+/// Whether the functions of the registers that `properties` depend on are small diagrams in the order of the circuit. Where they are large, sets of
+/// states are larger, and looking for a better order takes seconds.
+pub(crate) fn has_small_functions<'f>(
+    circuit: &Circuit,
+    properties: impl IntoIterator<Item = &'f Resolved>,
+    go_on: GoOn<'_>,
+) -> bool {
+    let cone = Cone::of(circuit, properties);
+    let nodes = (USUAL * cone.registers().count()).clamp(SMALL_FUNCTIONS, LARGE_FUNCTIONS);
+    let diagrams = |order| Diagrams::new(order, nodes);
+    model::Model::new(circuit, cone, &[], diagrams, None, go_on).is_ok()
 }
 
 /// When the order of variables changes.

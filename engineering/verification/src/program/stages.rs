@@ -3,6 +3,7 @@
 //! ```text
 //! very few states of each part   timers that begin each other: few of many states, and large diagrams;
 //!                                more while each scan finds no more of them than the one before
+//! few states listed one by one   only here where the diagrams of single functions are large, otherwise below
 //! diagrams of few nodes          most properties of most ladders, with runs that show why
 //! runs of a few scans            invariants of large programs that break soon
 //! induction over few scans       invariants, however large the program is
@@ -23,7 +24,7 @@ use super::{Answer, Bounds, Subject};
 use crate::effort::{Stopped, Work};
 use crate::explicit::{Explicit, ExplicitError, Extent};
 use crate::induction::{Depth, Induction, invariant, prove_always, search};
-use crate::symbolic::{Checker, Cone, Resolved, Verdict, rows};
+use crate::symbolic::{Checker, Cone, Resolved, Verdict, has_small_functions, rows};
 
 /// Nodes of the first and the second try.
 const NODES: [usize; 2] = [1 << 17, 1 << 20];
@@ -113,12 +114,16 @@ impl<'s, 'b> Stages<'s, 'b> {
     pub(super) fn run(mut self) -> Vec<Answer> {
         let [few, more] = NODES;
         let all = self.bounds.nodes;
+        let few_states = Explicit::few(self.subject.reduced()).min(self.bounds.states);
         self.list_parts();
+        let is_listed_first = self.has_large_functions();
+        let mut listed = if is_listed_first { self.list(few_states) } else { None };
         self.diagrams(few.min(all));
         self.search();
         self.induction(FEW_SCANS.min(self.bounds.scans), FEW_STEPS);
-        let few_states = Explicit::few(self.subject.reduced()).min(self.bounds.states);
-        let listed = self.list(few_states);
+        if !is_listed_first {
+            listed = self.list(few_states);
+        }
         if all > few {
             self.diagrams(more.min(all));
         }
@@ -142,6 +147,12 @@ impl<'s, 'b> Stages<'s, 'b> {
     fn answer(&mut self, place: usize, answer: Answer) {
         (self.answered)(place, &answer);
         self.answers[place] = Some(answer);
+    }
+
+    fn has_large_functions(&self) -> bool {
+        let left = self.left();
+        let asked = left.iter().map(|&place| &self.properties[place]);
+        !left.is_empty() && !has_small_functions(self.subject.reduced(), asked, self.bounds.go_on)
     }
 
     /// With few nodes the order of variables changes early, and not at the bound.

@@ -8,7 +8,7 @@ use understudy_logic::{Circuit, Expression, Operation, Variable};
 
 use super::core::Core;
 use super::jumps::Jump;
-use super::{Resolved, Signal};
+use super::{Resolved, Signal, USUAL};
 use crate::effort::{GoOn, Stopped, Work};
 
 /// The inputs and registers that some signals depend on, now and later.
@@ -90,9 +90,6 @@ impl Cone {
 /// many scans as there are registers, and jumps of stations that work at the same time are large functions.
 const SINGLE: usize = 64;
 
-/// Nodes for each register below which the order is not changed early: what many registers need in a good order takes longer to reorder than to compute.
-const USUAL: usize = 200;
-
 /// A circuit's part as diagrams over (x, u).
 pub(super) struct Model<'c> {
     pub(super) circuit: &'c Circuit,
@@ -128,6 +125,7 @@ impl<'c> Model<'c> {
         let graph = circuit.graph();
         let registers: Vec<u32> = cone.registers().collect();
         let diagrams = diagrams(order(circuit, &cone, &registers));
+        // What many registers need in a good order takes longer to reorder than to compute.
         diagrams.expect(USUAL * registers.len());
         let inputs = cone.variables.iter().copied();
         let inputs = inputs.filter(|variable| matches!(variable, Variable::Input(_)));

@@ -258,6 +258,23 @@ fn a_large_supervisor_is_decided() {
     assert!(!decide("never purging and blower"));
 }
 
+/// The functions of its registers are large diagrams in any order, and it has few states: they are listed before an order is looked for.
+#[test]
+fn states_are_listed_first_where_functions_are_large() {
+    let program = parse(include_str!("../../../../examples/boiler/main.ladder")).program;
+    let period = Duration::from_millis(100);
+    let subject = Subject::new(&program, period, &Asked::default()).expect("a right program");
+    let switches = |name| {
+        let property = read_one(&format!("AG (EF {name} & EF !{name})"), period).expect("right");
+        subject.resolve(&property).expect("known signals")
+    };
+    let asked = ["blower", "gas_valve_high"].map(switches);
+    let is_small = |work| !matches!(work, Work::Diagrams { nodes, .. } if nodes > 1 << 15);
+    let bounds = Bounds { go_on: &is_small, ..Bounds::default() };
+    let answers = subject.check(&asked, Vec::new(), bounds, &mut |_, _| {});
+    assert!(answers.iter().all(|answer| matches!(answer, Answer::Holds(_))), "{answers:?}");
+}
+
 /// Whoever has a clock can end it, and is told what was proved until then.
 #[test]
 fn a_proof_ends_when_nobody_waits() {
