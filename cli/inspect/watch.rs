@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     #[arg(value_name = "CLUSTER.toml|RUN|PLANT.toml")]
     target: PathBuf,
     /// Address of the page
-    #[arg(long, value_name = "ADDRESS", default_value_t = ADDRESS, value_parser = parse_address)]
+    #[arg(long, visible_alias = "listen", value_name = "ADDRESS", default_value_t = ADDRESS, value_parser = parse_address)]
     address: SocketAddr,
     /// Attach to a running laboratory; start none
     #[arg(long)]
