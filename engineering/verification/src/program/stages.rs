@@ -22,7 +22,7 @@ use understudy_logic::bdd::BddError;
 use super::part::Part;
 use super::{Answer, Bounds, Subject};
 use crate::effort::{Stopped, Work};
-use crate::explicit::{Explicit, ExplicitError, Extent};
+use crate::explicit::{Explicit, ExplicitError, Extent, MAXIMUM_INPUTS};
 use crate::induction::{Depth, Induction, invariant, prove_always, search};
 use crate::symbolic::{Checker, Cone, Resolved, Verdict, has_small_functions, rows};
 
@@ -149,10 +149,12 @@ impl<'s, 'b> Stages<'s, 'b> {
         self.answers[place] = Some(answer);
     }
 
+    /// Whether it can be listed, and is known to be too much for small diagrams.
     fn has_large_functions(&self) -> bool {
-        let left = self.left();
+        let (circuit, left) = (self.subject.reduced(), self.left());
+        let can_be_listed = self.fair.is_empty() && circuit.inputs().len() <= MAXIMUM_INPUTS;
         let asked = left.iter().map(|&place| &self.properties[place]);
-        !left.is_empty() && !has_small_functions(self.subject.reduced(), asked, self.bounds.go_on)
+        can_be_listed && !left.is_empty() && !has_small_functions(circuit, asked, self.bounds.go_on)
     }
 
     /// With few nodes the order of variables changes early, and not at the bound.

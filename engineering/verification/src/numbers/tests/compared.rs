@@ -27,15 +27,24 @@ END_PROGRAM";
 const FIELD: &str =
     "assume: raw >= 0\nassume: raw <= 4095\nassume: t < 200.0\nassume: !(start & stop)\n";
 
-fn model(asked: &Properties) -> Model {
-    Model::of_program(&lowered(TANK), &Asked::of([asked])).expect("followed")
+/// What is written as it is declared.
+const CALENDAR: &str = "
+PROGRAM calendar
+  VAR_INPUT day : DATE; at : TIME_OF_DAY; END_VAR
+  VAR_OUTPUT leap : BOOL; afternoon : BOOL; END_VAR
+  leap := day = D#2024-02-29;
+  afternoon := at >= TOD#12:00:00;
+END_PROGRAM";
+
+fn model(program: &str, asked: &Properties) -> Model {
+    Model::of_program(&lowered(program), &Asked::of([asked])).expect("followed")
 }
 
-/// Whether a property is proved; fails with a run; undecided is neither.
-fn verdict(asked: &Properties, property: &str) -> Option<bool> {
+/// Whether a property of a program is proved; fails with a run; undecided is neither.
+fn verdict(program: &str, asked: &Properties, property: &str) -> Option<bool> {
     let mut asked = asked.clone();
     asked.properties = vec![read_one(property, PERIOD).expect("a property")];
-    match ask(&model(&asked), property) {
+    match ask(&model(program, &asked), property) {
         Answer::Holds(_) => Some(true),
         Answer::Fails(_) => Some(false),
         Answer::Undecided(_) => None,
@@ -68,8 +77,21 @@ fn numbers_are_compared_with_values_and_with_each_other() {
     let field = read(FIELD, PERIOD);
     assert_eq!((field.assumed.len(), field.diagnostics.len()), (4, 0));
     for (property, of_all, of_field) in VERDICTS {
-        assert_eq!(verdict(&none, property), Some(of_all), "{property}");
-        assert_eq!(verdict(&field, property), Some(of_field), "{property}, in the field");
+        assert_eq!(verdict(TANK, &none, property), Some(of_all), "{property}");
+        assert_eq!(verdict(TANK, &field, property), Some(of_field), "{property}, in the field");
+    }
+}
+
+#[test]
+fn dates_and_times_of_day_are_compared_as_they_are_written() {
+    let none = Properties::default();
+    for (property, holds) in [
+        ("never leap and day > D#2024-02-29", true),
+        ("never leap and day < D#2024-03-01", false),
+        ("afternoon only while at >= TOD#12:00:00", true),
+        ("afternoon only while at > TOD#12:00:00", false),
+    ] {
+        assert_eq!(verdict(CALENDAR, &none, property), Some(holds), "{property}");
     }
 }
 
@@ -121,7 +143,7 @@ assume: raw < percent
 assume: nothing < 5
 ";
     let found = read(text, PERIOD);
-    let model = model(&found);
+    let model = model(TANK, &found);
     let resolved = found.properties.iter().filter_map(|property| model.resolve(property).err());
     let assumed = found.assumed.iter().map(|property| model.wrong_assumption(property));
     let told: Vec<String> = resolved
@@ -134,9 +156,30 @@ assume: nothing < 5
     insta::assert_snapshot!(told.join("\n"));
 }
 
+/// Which of the two was meant is not guessed.
+#[test]
+fn a_name_of_a_variable_and_a_value_is_told() {
+    let program = "
+TYPE MODE : (idle, full); END_TYPE
+PROGRAM two
+  VAR_INPUT full : INT; END_VAR
+  VAR_OUTPUT mode : MODE; END_VAR
+  IF full > 3 THEN mode := MODE#full; ELSE mode := MODE#idle; END_IF;
+END_PROGRAM";
+    let found = read("never mode = full", PERIOD);
+    let told = model(program, &found).resolve(&found.properties[0]).expect_err("two meanings");
+    let [told] = &told[..] else {
+        panic!("{told:?}");
+    };
+    assert_eq!((told.code, &*told.message), ("U0435", "`full` is a variable, and a value of MODE"));
+    assert!(told.help.as_ref().is_some_and(|help| help.contains("`MODE#full`")), "{told:?}");
+    let none = Properties::default();
+    assert_eq!(verdict(program, &none, "mode = MODE#full -> full > 3"), Some(true));
+}
+
 #[test]
 fn assumptions_that_contradict_each_other_prove_nothing() {
     let contradiction = read("assume: raw < 3\nassume: raw > 5\n", PERIOD);
-    assert_eq!(verdict(&contradiction, "never percent > 100"), None);
-    assert_eq!(verdict(&contradiction, "percent = 1 can be reached"), None);
+    assert_eq!(verdict(TANK, &contradiction, "never percent > 100"), None);
+    assert_eq!(verdict(TANK, &contradiction, "percent = 1 can be reached"), None);
 }
