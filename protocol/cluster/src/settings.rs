@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use understudy_cycle::Mode;
-use understudy_remote_io::{PairSettings, PointPlace, SignalSource};
+use understudy_remote_io::{PairSettings, PointPlace, SharedOutputs, SignalSource};
 use understudy_wire::{Image, Member, Moment, ProgramId, StationId};
 
 use crate::cluster::{Cluster, RemoteIo, Twin};
@@ -70,6 +70,7 @@ impl Cluster {
                 .twin
                 .as_ref()
                 .map_or_else(Vec::new, |twin| twin.paired_inputs.clone()),
+            shared_outputs: shared_outputs(remote_io),
         })
     }
 
@@ -114,6 +115,11 @@ impl Cluster {
             },
             watchdog_cycles: place.watchdog_cycles,
             has_two_modules,
+            shared_outputs: shared_outputs(remote_io),
         })
     }
+}
+
+fn shared_outputs(remote_io: &RemoteIo) -> SharedOutputs {
+    remote_io.twin.as_ref().map_or_else(SharedOutputs::default, |twin| twin.shared_outputs.clone())
 }
