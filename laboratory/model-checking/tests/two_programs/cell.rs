@@ -47,7 +47,7 @@ fn number() -> Circuit {
     for bit in 0..8 {
         match bit {
             2 => builder.output("y", mixed),
-            _ => builder.output(&format!("y{bit}"), never),
+            _ => builder.output(format!("y{bit}"), never),
         }
     }
     builder.finish().expect("a circuit")
