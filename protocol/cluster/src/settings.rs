@@ -70,7 +70,7 @@ impl Cluster {
                 .twin
                 .as_ref()
                 .map_or_else(Vec::new, |twin| twin.paired_inputs.clone()),
-            shared_outputs: shared_outputs(remote_io),
+            shared_outputs: self.shared_outputs(program, remote_io),
         })
     }
 
@@ -115,11 +115,19 @@ impl Cluster {
             },
             watchdog_cycles: place.watchdog_cycles,
             has_two_modules,
-            shared_outputs: shared_outputs(remote_io),
+            shared_outputs: self.shared_outputs(program, remote_io),
         })
     }
-}
 
-fn shared_outputs(remote_io: &RemoteIo) -> SharedOutputs {
-    remote_io.twin.as_ref().map_or_else(SharedOutputs::default, |twin| twin.shared_outputs.clone())
+    /// Numbers that two modules of a program share. The watchdog of a simulated plant is that of its modules, and may be longer than is needed.
+    fn shared_outputs(&self, program: ProgramId, remote_io: &RemoteIo) -> SharedOutputs {
+        let Some(twin) = &remote_io.twin else {
+            return SharedOutputs::default();
+        };
+        let pair = PairSettings::exclusive(twin.take_over_after);
+        let plant = self.plants.get(program.index()).and_then(Option::as_ref);
+        let later = plant.map_or(0, |plant| plant.watchdog_cycles.saturating_sub(pair.lasting()));
+        let shared = &twin.shared_outputs;
+        SharedOutputs { places: shared.places.clone(), delay: shared.delay.max(later) }
+    }
 }

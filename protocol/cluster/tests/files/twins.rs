@@ -164,6 +164,18 @@ fn numbers_that_two_modules_share() {
         assert_eq!((shared.places.len(), shared.delay), (1, 0));
         assert_eq!((shared.places[0].bit, shared.places[0].of), (0, Elementary::Int));
     }
+    // The modules of a simulated plant keep what they were told for as long as its watchdog says: 4 cycles are needed.
+    let twin = format!("twin = {{ name = \"tank-io-2\", wiring = \"parallel\"{half} }}");
+    let text = format!(
+        "{CELL}[[remote_io]]\ncontroller = \"tank\"\n{twin}\n\
+         [[plant]]\nname = \"basin\"\ncontroller = \"tank\"\nladder = \"basin.st\"\nwatchdog_cycles = 20\n"
+    );
+    let basin = "PROGRAM basin\nVAR_INPUT\n pump : INT;\nEND_VAR\nVAR_OUTPUT\n level : REAL;\n count : INT;\n full : BOOL;\nEND_VAR\n\
+         full := pump > 5;\nEND_PROGRAM\n";
+    let loaded = load(&text, &[("tank.st", &tank("INT")), ("basin.st", basin)]);
+    let slow = loaded.cluster.unwrap_or_else(|| panic!("{}", findings(&loaded.reports)));
+    let settings = slow.remote_io_settings(ProgramId(0)).expect("a remote I/O");
+    assert_eq!(settings.shared_outputs.delay, 16);
     let other = parallel(", share = { pump = \"half\" }, discrepancy_cycles = 7", "", "INT").0;
     let hash = |cluster: &Cluster| cluster.agreement().configuration;
     assert_ne!(hash(&cluster), hash(&other.expect("a cluster")));
