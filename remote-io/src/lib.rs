@@ -13,6 +13,7 @@ mod paired_inputs;
 mod remote_io;
 mod selection;
 mod settings;
+mod sharing;
 mod source;
 mod trust;
 mod votes;
@@ -26,5 +27,5 @@ pub use remote_io::RemoteIo;
 pub use settings::{PairSettings, SWITCHOVER, Settings, StopPoints, Wiring};
 pub use source::{OperatorInput, OperatorInputKind, SignalInput, SignalSource, ValueMismatch};
 pub use understudy_cycle::{
-    Fallback, PointPlace, Ramp, Release, Restart, StaleState, ValueFault, in_order,
+    Fallback, PointPlace, Ramp, Release, Restart, SharedOutputs, StaleState, ValueFault, in_order,
 };

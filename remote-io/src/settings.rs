@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::{Agreement, Fallback, PointPlace};
+use understudy_cycle::{Agreement, Fallback, PointPlace, SharedOutputs};
 use understudy_wire::{Image, ProgramHash, ProgramId};
 
 use crate::channel::Channel;
@@ -43,6 +43,8 @@ pub struct Settings {
     pub pair: Option<PairSettings>,
     /// Inputs that modules of both remote I/Os read; of no importance where only the author is wired to the plant.
     pub paired_inputs: Vec<PairedInput>,
+    /// Numbers that modules of both remote I/Os drive together.
+    pub shared_outputs: SharedOutputs,
 }
 
 /// Configuration of one of two remote I/Os of a program.
@@ -78,7 +80,7 @@ pub enum Wiring {
     /// Both reach one device, and the author only connects to it.
     Exclusive,
     /// Each has modules of its own. Two input modules read each sensor, and two output modules drive each actuator through diodes: it is on where one of
-    /// them drives it.
+    /// them drives it. Numbers that both drive add up ([`Settings::shared_outputs`]).
     Parallel {
         /// Samples in a row in which two readings of an input differ until an operator is told: at least 1.
         discrepancy_cycles: u32,

@@ -258,6 +258,8 @@ struct Row {
     unrecorded: u64,
     /// Reports that the input modules of a program differ, which they do not.
     input_alarms: u64,
+    /// Questions to the operator, who does not answer here: the program stands still from then on.
+    questions: u64,
     /// Longest time without a write to the devices of a program, in periods.
     longest_gap_cycles: f64,
     /// Longest time that a device took to answer, in periods: a remote I/O gives up one that does not answer within its `timeout`.
@@ -270,6 +272,7 @@ struct OfProgram {
     /// What its authors have driven.
     driven: Vec<Outputs>,
     input_alarms: u64,
+    questions: u64,
 }
 
 /// What the members of a run have recorded: of each program, and when processes have ended.
@@ -304,6 +307,8 @@ fn recorded(directory: &Path, cluster: &Cluster) -> Result<(Vec<OfProgram>, Vec<
                 let is_alarm =
                     matches!(event, Event::InputsDiffer { .. } | Event::InputExcluded { .. });
                 of_program.input_alarms += u64::from(is_alarm);
+                let is_question = matches!(event, Event::StateLost { asks: true, .. });
+                of_program.questions += u64::from(is_question);
             }
             _ => {}
         }
@@ -429,6 +434,7 @@ fn row(
         unproved: found.iter().map(|it| it.unproved.len() as u64).sum(),
         unrecorded: found.iter().map(|it| it.unrecorded).sum(),
         input_alarms: programs.iter().map(|it| it.input_alarms).sum(),
+        questions: programs.iter().map(|it| it.questions).sum(),
         longest_gap_cycles: longest as f64 / period.as_nanos() as f64,
         slowest_answer_cycles: slowest as f64 / period.as_nanos() as f64,
     })
@@ -436,7 +442,7 @@ fn row(
 
 fn answer(rows: &[Row]) -> Answer {
     let mut text = format!(
-        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12} {:>15}\n",
+        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>12} {:>15}\n",
         "fault",
         "count",
         "wrong",
@@ -449,13 +455,14 @@ fn answer(rows: &[Row]) -> Answer {
         "unproved",
         "unrecorded",
         "input alarms",
+        "questions",
         "longest gap",
         "slowest answer"
     );
     for row in rows {
         let _ = writeln!(
             text,
-            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>12.1} {:>15.1}",
+            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>12.1} {:>15.1}",
             row.fault,
             row.count,
             row.wrong,
@@ -468,6 +475,7 @@ fn answer(rows: &[Row]) -> Answer {
             row.unproved,
             row.unrecorded,
             row.input_alarms,
+            row.questions,
             row.longest_gap_cycles,
             row.slowest_answer_cycles
         );
@@ -475,7 +483,7 @@ fn answer(rows: &[Row]) -> Answer {
             let _ = writeln!(text, "    {violation}");
         }
     }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
+    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\na program of which a question is asked stands still until the end of its row;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
     let is_right =
         |row: &Row| (row.wrong, row.by_two, row.unproved, row.input_alarms) == (0, 0, 0, 0);
     let passed = rows.iter().all(is_right);

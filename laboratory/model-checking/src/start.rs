@@ -24,6 +24,8 @@ pub struct Start {
     pub change: Changed,
     /// Links, from a sender to a receiver, that were broken for longer than the history of a sample.
     pub broken: Vec<(Member, Member)>,
+    /// Cycles that pass before the run begins, in which nothing happens.
+    pub quiet_cycles: u64,
 }
 
 /// An online change at the beginning of a run.
@@ -60,7 +62,7 @@ impl Start {
                 (true, true) if !self.change.prepared.is_empty() => {
                     SYNCHRONISED.cycle + CHANGE_CYCLES
                 }
-                (true, true) => SYNCHRONISED.cycle,
+                (true, true) => SYNCHRONISED.cycle + self.quiet_cycles,
                 (false, true) => SYNCHRONISED.cycle + 1,
                 (_, false) => SYNCHRONISED.cycle + BROKEN_CYCLES,
             },

@@ -22,7 +22,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Endpoint, Input, Machine, OnlineChange, Output};
+use understudy_cycle::{Agreement, Endpoint, Input, Machine, OnlineChange, Output, SharedOutputs};
 use understudy_wire::{
     Body, Configurations, Field, Frame, Header, Image, Member, Moment, ProgramId, Time,
 };
@@ -54,6 +54,8 @@ pub struct Settings {
     /// Whether two remote I/Os drive it by modules of their own, through diodes: an actuator is on where one of the two modules drives it, and each has
     /// a watchdog.
     pub has_two_modules: bool,
+    /// Numbers that these modules drive together: they add up.
+    pub shared_outputs: SharedOutputs,
 }
 
 /// A plant between its remote I/O and its neighbours.
@@ -206,10 +208,9 @@ impl PlantMachine {
             return driven.outputs.clone();
         }
         let limit = self.period() * self.settings.watchdog_cycles;
-        let mut outputs = Image::zero(self.settings.fail_safe.width());
         let lasting = self.modules.iter().flatten().filter(|it| now.since(it.at) < limit);
-        lasting.for_each(|module| outputs.unite(&module.outputs));
-        outputs
+        let width = self.settings.fail_safe.width();
+        self.settings.shared_outputs.sum(width, lasting.map(|module| &module.outputs))
     }
 
     fn wake(&mut self, now: Time) {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use proptest::prelude::*;
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule, SharedOutputs};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{
     BindingProblem, Event, Followed, ModelKind, Plant, PlantMachine, Settings, Signals,
@@ -105,6 +105,7 @@ fn machine() -> PlantMachine {
             fail_safe: Image::zero(1),
             watchdog_cycles: WATCHDOG_CYCLES,
             has_two_modules: false,
+            shared_outputs: SharedOutputs::default(),
         },
         Time(0),
     )

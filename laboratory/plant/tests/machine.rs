@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_cycle::{
     Agreement, ChangeOrder, Fallback, FallbackChange, Input, Machine, Mode, OnlineChange, Output,
-    Release, Schedule, StaleState, ValueFault,
+    Release, Schedule, SharedOutputs, StaleState, ValueFault,
 };
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{
@@ -60,6 +60,7 @@ fn machine_with(has_two_modules: bool) -> PlantMachine {
             fail_safe: Image::from_bits([false, true]),
             watchdog_cycles: WATCHDOG_CYCLES,
             has_two_modules,
+            shared_outputs: SharedOutputs::default(),
         },
         Time(0),
     )

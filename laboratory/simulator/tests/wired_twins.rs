@@ -239,3 +239,21 @@ fn an_exclusion_lasts_until_it_is_released() {
     );
     assert!(as_expected, "{told:?}");
 }
+
+/// A follower that was suspended, and takes over before it receives the author again, goes on with what that one has excluded.
+#[test]
+fn a_follower_that_was_suspended_knows_what_is_excluded() {
+    let stuck = [(100, FIRST, 1, Some(false))];
+    let faults = [
+        fault(600, 0.3, TWIN, Action::Stop),
+        fault(605, 0.3, FIRST, Action::Crash),
+        fault(610, 0.3, TWIN, Action::Continue),
+    ];
+    let outcome = run(parts(1), &faults, &stuck, 700);
+    assert_eq!(outcome.simulation.author(ROBOT), Some(TWIN));
+    let told = outcome.told.iter().filter(|(cycle, _)| *cycle >= 600);
+    let told: Vec<_> = told.filter(|(_, it)| !matches!(it, Event::PartnerLost { .. })).collect();
+    let is_known =
+        matches!(told[..], [(610..700, Event::InputExcluded { at: FIRST, input: 1, .. })]);
+    assert!(is_known, "{told:?}");
+}

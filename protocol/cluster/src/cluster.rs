@@ -20,7 +20,7 @@ use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{Diagnosis, Fallback, PairedInput, StopPoints, Wiring};
+use understudy_remote_io::{Diagnosis, Fallback, PairedInput, SharedOutputs, StopPoints, Wiring};
 use understudy_typed::{Points, Program as TypedProgram};
 use understudy_wire::{Member, ProgramHash, ProgramId, ProgramSet, Roster, StationId};
 
@@ -167,6 +167,8 @@ pub struct Twin {
     pub wiring: Wiring,
     /// Inputs that modules of both read.
     pub paired_inputs: Vec<PairedInput>,
+    /// Numbers that modules of both drive together.
+    pub shared_outputs: SharedOutputs,
     /// The device of its own modules; none where the first one has none, or both are at one device.
     pub field: Option<FieldDevice>,
     /// Where it listens, if the file says so.

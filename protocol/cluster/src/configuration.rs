@@ -70,6 +70,9 @@ pub(crate) fn configuration_text(
                 let (bit, tolerance) = (input.place.bit, input.tolerance.to_bits());
                 line(format_args!("  tolerance {bit} {tolerance:016x}"));
             }
+            for place in &twin.shared_outputs.places {
+                line(format_args!("  share {} {}", place.bit, twin.shared_outputs.delay));
+            }
         }
         for source in &remote_io.inputs {
             line(format_args!("  input {}", source_text(source)));

@@ -126,6 +126,8 @@ pub(crate) struct TwinSection {
     pub(crate) connection: Option<ConnectionText>,
     pub(crate) discrepancy_cycles: u32,
     pub(crate) tolerance: Vec<(Placed<String>, Constant)>,
+    /// Numeric outputs that both drive, and how each of them does it.
+    pub(crate) share: BTreeMap<String, (Range<usize>, Placed<String>)>,
     /// Keys that only one of the wirings has, with their places.
     pub(crate) special: Vec<Placed<&'static str>>,
     pub(crate) addresses: Addresses<Placed<SocketAddr>>,
@@ -351,7 +353,7 @@ fn twin<'a, 't>(
         return None;
     }
     let fields = fields.table("twin", &TWIN, empty, diagnostics);
-    let special = ["owner_timeout", "modbus", "discrepancy_cycles", "tolerance"];
+    let special = ["owner_timeout", "modbus", "discrepancy_cycles", "tolerance", "share"];
     let special = special.into_iter();
     Some(TwinSection {
         is_parallel: fields.word("wiring", diagnostics) == 1,
@@ -361,6 +363,7 @@ fn twin<'a, 't>(
             .flatten(),
         discrepancy_cycles: fields.count("discrepancy_cycles", diagnostics),
         tolerance: fields.values("tolerance", diagnostics),
+        share: fields.names("share", diagnostics),
         special: special
             .filter_map(|value| Some(Placed { value, span: fields.place_of(value)? }))
             .collect(),

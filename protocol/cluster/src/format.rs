@@ -212,6 +212,7 @@ pub(crate) static TWIN: Section = Section {
         key modbus: Kind::Connection, "the device with the modules of the twin, with the places of `[remote_io.field]`; of `parallel`";
         key discrepancy_cycles: count(2, MANY_CYCLES, DISCREPANCY_CYCLES), "samples in a row in which the two readings of an input may differ before an alarm is raised; of `parallel`";
         key tolerance: Kind::Values, "greatest difference of two readings of a number that agree, by the name of the input, such as `{ level = 0.5 }`; 0 for all others; of `parallel`";
+        key share: Kind::Names, "numeric outputs that both drive together, such as `{ valve = \"half\" }`: what the two modules drive adds up, so each drives half, and the whole while the other one drives nothing; of `parallel`";
         key address: Kind::Address, "as for a controller";
         key second_address: Kind::Address, "as for a controller";
     },

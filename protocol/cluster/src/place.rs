@@ -121,6 +121,11 @@ impl Registers {
 }
 
 impl Place {
+    /// Whether a signal of 0 is another number in its registers.
+    pub fn has_offset(&self) -> bool {
+        matches!(self, Self::Number(registers) if registers.offset != 0.0)
+    }
+
     /// How places are written.
     pub const EXAMPLES: &str = "\"discrete:0\", \"coil:3\", \"input:10.4\" or \"holding:10.4\" (register and bit) for a BOOL, and \"input:10 real\" \
          or \"holding:10 int\" (first register and type) for a number";

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use understudy_cycle::Mode;
-use understudy_remote_io::{PairSettings, PointPlace, SignalSource};
+use understudy_remote_io::{PairSettings, PointPlace, SharedOutputs, SignalSource};
 use understudy_wire::{Image, Member, Moment, ProgramId, StationId};
 
 use crate::cluster::{Cluster, RemoteIo, Twin};
@@ -70,6 +70,7 @@ impl Cluster {
                 .twin
                 .as_ref()
                 .map_or_else(Vec::new, |twin| twin.paired_inputs.clone()),
+            shared_outputs: self.shared_outputs(program, remote_io),
         })
     }
 
@@ -114,6 +115,19 @@ impl Cluster {
             },
             watchdog_cycles: place.watchdog_cycles,
             has_two_modules,
+            shared_outputs: self.shared_outputs(program, remote_io),
         })
+    }
+
+    /// Numbers that two modules of a program share. The watchdog of a simulated plant is that of its modules, and may be longer than is needed.
+    fn shared_outputs(&self, program: ProgramId, remote_io: &RemoteIo) -> SharedOutputs {
+        let Some(twin) = &remote_io.twin else {
+            return SharedOutputs::default();
+        };
+        let pair = PairSettings::exclusive(twin.take_over_after);
+        let plant = self.plants.get(program.index()).and_then(Option::as_ref);
+        let later = plant.map_or(0, |plant| plant.watchdog_cycles.saturating_sub(pair.lasting()));
+        let shared = &twin.shared_outputs;
+        SharedOutputs { places: shared.places.clone(), delay: shared.delay.max(later) }
     }
 }

@@ -17,6 +17,7 @@ mod place;
 mod ramp;
 mod reception;
 mod schedule;
+mod shared;
 pub mod spare;
 mod waking;
 
@@ -34,3 +35,4 @@ pub use participant::{Endpoint, Notice, Participant, Refusal};
 pub use place::{PointPlace, in_order};
 pub use ramp::{Descent, Ramp};
 pub use schedule::{Schedule, ScheduleError, Turns};
+pub use shared::SharedOutputs;

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 12
+//!      4     1  version of this layout, 13
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -24,7 +24,7 @@ use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 12;
+const VERSION: u8 = 13;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.

@@ -383,8 +383,10 @@ pub struct Pair {
 pub enum Modules {
     /// The author.
     Author {
-        /// Outputs that its modules drive from the deadline of this cycle on; `None` in any other frame than the one of a deadline.
+        /// Outputs that the modules of the other one drive from the deadline of this cycle on; `None` in any other frame than the one of a deadline.
         outputs: Option<Image>,
+        /// What these outputs are of the numbers that the modules of both drive together; the whole where there are none.
+        share: Share,
         /// [`Pair::sent`] of the newest frame of the other one: the outputs were sent later.
         answers: Option<Time>,
         /// Inputs, by their first bits, whose module is not trusted, at the first remote I/O and at the twin: at one of them where it is excluded, at both
@@ -398,6 +400,32 @@ pub enum Modules {
         /// Whether its modules drive the outputs of the author.
         follows: bool,
     },
+}
+
+/// What one of two modules drives of a number that both drive together.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize,
+)]
+pub enum Share {
+    /// 0.
+    Nothing,
+    /// Half of it.
+    Half,
+    /// The number itself.
+    #[default]
+    Whole,
+}
+
+impl Share {
+    /// What the other one may drive.
+    #[must_use]
+    pub fn rest(self) -> Self {
+        match self {
+            Self::Nothing => Self::Whole,
+            Self::Half => Self::Half,
+            Self::Whole => Self::Nothing,
+        }
+    }
 }
 
 /// The part of one of two remote I/Os of a program.

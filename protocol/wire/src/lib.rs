@@ -29,7 +29,7 @@ pub use force::{
 pub use frame::{
     Actuation, Body, Configurations, Field, Frame, Header, Holding, Join, Kept,
     MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Modules, Pair, Part, Partial, Recalled, Relayed, Sample,
-    SamplesReceived, Source, Step, Transfer, Turn, Word,
+    SamplesReceived, Share, Source, Step, Transfer, Turn, Word,
 };
 pub use identifier::{
     AuthorityHash, ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS,

@@ -190,9 +190,9 @@ impl RemoteIo {
         if let Some(stop) = self.settings.stop {
             driven.set(stop.stopped, self.program != Execution::Running);
         }
-        self.note_driven(&driven);
+        let outputs_of_modules = self.divide(&driven);
         self.member.put(Output::Drive {
-            outputs: driven.clone(),
+            outputs: outputs_of_modules,
             sampled: missing.is_none().then_some(self.sampled_at),
         });
         self.report(Event::Applied {

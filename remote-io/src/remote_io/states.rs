@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use understudy_cycle::{
     Agreement, Fallback, Input, Machine, Mode, Output, PointPlace, Release, RemoteIoInput,
-    Schedule, StaleState, ValueFault,
+    Schedule, SharedOutputs, StaleState, ValueFault,
 };
 use understudy_testing::states::Table;
 use understudy_wire::{
@@ -110,6 +110,7 @@ impl Bench {
             },
             pair: None,
             paired_inputs: Vec::new(),
+            shared_outputs: SharedOutputs::default(),
         };
         Self { remote_io: RemoteIo::new(Time(0), settings), cycle: 100 }
     }

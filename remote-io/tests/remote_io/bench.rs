@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
 use understudy_remote_io::{
-    Event, Fallback, PointPlace, Release, RemoteIo, Settings, StaleState, ValueFault,
+    Event, Fallback, PointPlace, Release, RemoteIo, Settings, SharedOutputs, StaleState, ValueFault,
 };
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
@@ -58,6 +58,7 @@ pub(crate) fn settings(understudies: usize) -> Settings {
         },
         pair: None,
         paired_inputs: Vec::new(),
+        shared_outputs: SharedOutputs::default(),
     }
 }
 

@@ -10,9 +10,11 @@ use understudy_cycle::{
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
 use understudy_remote_io::{
-    Fallback, PairSettings, PairedInput, Release, StaleState, ValueFault, Wiring,
+    Fallback, PairSettings, PairedInput, PointPlace, Release, SharedOutputs, StaleState,
+    ValueFault, Wiring,
 };
 use understudy_simulator::Parts;
+use understudy_typed::Elementary;
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Image, Moment, ProgramHash, ProgramId, StationId,
 };
@@ -29,6 +31,25 @@ fn program(first: bool) -> Circuit {
     builder.set_next(newer, mixed);
     builder.set_next(older, is);
     builder.output("y", mixed);
+    builder.finish().expect("a circuit")
+}
+
+/// [`program`] with an output of eight bits, of which one changes.
+fn number() -> Circuit {
+    let mut builder = CircuitBuilder::new("program");
+    let u = builder.input("u");
+    let (older, was) = builder.register("x1", false);
+    let (newer, is) = builder.register("x0", true);
+    let mixed = builder.graph().xor(was, u);
+    builder.set_next(newer, mixed);
+    builder.set_next(older, is);
+    let never = builder.graph().constant(false);
+    for bit in 0..8 {
+        match bit {
+            2 => builder.output("y", mixed),
+            _ => builder.output(format!("y{bit}"), never),
+        }
+    }
     builder.finish().expect("a circuit")
 }
 
@@ -116,6 +137,22 @@ pub(crate) fn paired(wiring: Wiring) -> Parts {
     parts
 }
 
+/// The same where the output is a number that modules of both drive together: 4 or 0, so that two halves are 4, and anything more is found.
+pub(crate) fn sharing() -> Parts {
+    let mut parts = cell(&[number()], (1, 0), Turns::Token);
+    parts.change = None;
+    for remote_io in &mut parts.remote_ios {
+        let wiring = Wiring::Parallel { discrepancy_cycles: 2 };
+        remote_io.pair = Some(PairSettings { wiring, ..PairSettings::exclusive(1) });
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
+        let places = vec![PointPlace { bit: 0, of: Elementary::Usint }];
+        remote_io.output_points.clone_from(&places);
+        remote_io.shared_outputs = SharedOutputs { places, delay: 0 };
+        remote_io.fallback.fail_safe = Image::zero(8);
+    }
+    parts
+}
+
 /// Two programs.
 pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
     parts_with_spares(understudies, 0, turns)
@@ -173,6 +210,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         fallback: fallback(),
         pair: None,
         paired_inputs: Vec::new(),
+        shared_outputs: SharedOutputs::default(),
     });
     let plants = circuits.iter().map(|circuit| {
         let kind = ModelKind::Program(Box::new((&plant()).into()));

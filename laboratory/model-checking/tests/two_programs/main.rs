@@ -11,7 +11,7 @@ use understudy_cycle::Turns;
 use understudy_model_checking::{Budget, Model, Start, Step, check};
 use understudy_simulator::{Parts, Tally};
 
-use cell::{paired, parts};
+use cell::{paired, parts, sharing};
 
 /// All that can be done once, and nothing of anything.
 const ONE: Budget = Budget {

@@ -10,7 +10,11 @@ fn check_pair(budget: Budget, states: usize) {
 }
 
 fn check_wired(wiring: Wiring, budget: Budget, states: usize) {
-    let model = Model::new(paired(wiring), Start::default(), budget);
+    check_from(Start::default(), paired(wiring), budget, states);
+}
+
+fn check_from(start: Start, parts: Parts, budget: Budget, states: usize) {
+    let model = Model::new(parts, start, budget);
     let verdict = check(model.expect("it synchronises"), 2);
     assert_eq!(verdict.counterexamples, []);
     assert_eq!(verdict.states, states, "a protocol that has changed has other states");
@@ -64,4 +68,22 @@ fn two_faults_of_two_that_are_both_wired() {
 #[ignore = "it takes a minute"]
 fn two_crashes_or_stops_of_two_that_are_both_wired() {
     check_wired(PARALLEL, Budget { cuts: 0, ..TWO }, 681_165);
+}
+
+/// Each of the two drives half of the number.
+fn check_sharing(budget: Budget, states: usize) {
+    let start = Start { quiet_cycles: 20, ..Start::default() };
+    check_from(start, sharing(), budget, states);
+}
+
+/// A number that modules of both drive together is never driven with more than its value, and what one of the two drives next to the author is a part of
+/// what the author has driven.
+#[test]
+fn one_fault_of_two_that_share_a_number() {
+    check_sharing(Budget { cuts: 1, ..ONE }, 43_865);
+}
+
+#[test]
+fn two_faults_of_two_that_share_a_number() {
+    check_sharing(Budget { losses: 2, cycles: 1, ..TWO }, 167_053);
 }

@@ -47,6 +47,7 @@ fn referee() -> Referee {
         fallback: fallback(),
         pair: None,
         paired_inputs: Vec::new(),
+        shared_outputs: understudy_remote_io::SharedOutputs::default(),
     };
     Referee::new(&settings, (&circuit).into())
 }

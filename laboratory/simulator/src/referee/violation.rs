@@ -87,6 +87,14 @@ pub enum Violation {
         /// What they drive.
         driven: Image,
     },
+    /// What the modules of both remote I/Os drive of a number adds up to more than an author has decided.
+    #[error(
+        "in cycle {moment} the modules of both remote I/Os drive more of a number than its value"
+    )]
+    TooMuch {
+        /// The cycle in which it happened.
+        moment: Moment,
+    },
     /// The two modules of an input have shown different values for long, and no remote I/O has reported it, or the report has ended meanwhile.
     #[error(
         "in cycle {moment} the modules of the input at bit {input} show different values for too long, and it is not reported"

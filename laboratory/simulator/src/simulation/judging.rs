@@ -26,6 +26,7 @@ impl Simulation {
         event: &Event,
         observe: &mut Observe<'_>,
     ) {
+        let too_much = self.judge_sum(program, event);
         if self.may_be_misled(program, event) {
             self.ready.remove(program);
             self.tallies[program.index()].count(event);
@@ -71,7 +72,7 @@ impl Simulation {
             let referee = &self.referees[program.index()];
             self.signals.note(program, referee.truth());
         }
-        if let Some(violation) = found {
+        if let Some(violation) = found.or(too_much) {
             observe(self.now, self.pace.cycle(), member, Record::Violation(&violation));
             self.violations.push(violation);
         }

@@ -6,6 +6,7 @@ use understudy_wire::{Image, Member, Part, ProgramId, ProgramSet, StateChoice};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
+use crate::modules::Wrong;
 use crate::referee::Violation;
 use crate::slot::Slot;
 
@@ -122,19 +123,27 @@ impl Simulation {
         outputs: &Image,
         observe: &mut Observe<'_>,
     ) {
-        let (actuators, is_wrong) = self.modules[program.index()].follow(self.now, member, outputs);
-        if is_wrong {
-            let moment = self.referees[program.index()].truth().map(|(moment, _)| moment);
-            let violation = Violation::NotFollowed {
-                moment: moment.unwrap_or_default(),
-                driven: outputs.clone(),
-            };
+        let (actuators, wrong) = self.modules[program.index()].follow(self.now, member, outputs);
+        let moment = self.referees[program.index()].truth().map(|(moment, _)| moment);
+        let moment = moment.unwrap_or_default();
+        let violation = wrong.map(|wrong| match wrong {
+            Wrong::NotOfAuthor => Violation::NotFollowed { moment, driven: outputs.clone() },
+            Wrong::TooMuch => Violation::TooMuch { moment },
+        });
+        if let Some(violation) = violation {
             observe(self.now, self.pace.cycle(), member, Record::Violation(&violation));
             self.violations.push(violation);
         }
         if let Some(actuators) = actuators {
             self.drive_plant(program, &actuators, observe);
         }
+    }
+
+    /// Takes an event of a remote I/O: whether the modules of both drive more than it has decided.
+    pub(super) fn judge_sum(&mut self, program: ProgramId, event: &Event) -> Option<Violation> {
+        let is_too_much = self.modules[program.index()].decided(self.now, event.driven()?);
+        let moment = self.referees[program.index()].truth().map(|(moment, _)| moment);
+        is_too_much.then(|| Violation::TooMuch { moment: moment.unwrap_or_default() })
     }
 
     /// An input module of one of two remote I/Os shows a fixed value of an input from now on; the true one again with `None`.

@@ -128,12 +128,13 @@ const SHORT: [(&str, &str); 12] = [
 ];
 
 /// The same of those whose text is none of the file.
-const LONG: [(&str, &str); 6] = [
+const LONG: [(&str, &str); 7] = [
     ("schedule ", "schedule"),
     ("  fail-safe ", "fail_safe"),
     ("  ramp ", "ramp"),
     ("  twin ", "twin"),
     ("  tolerance ", "tolerance"),
+    ("  share ", "share"),
     ("  input ", "inputs"),
 ];
 

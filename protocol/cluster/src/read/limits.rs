@@ -127,8 +127,8 @@ mod tests {
     use understudy_wire::{
         Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
         Lineage, MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Member, Modules, Moment, Pair, Part,
-        ProgramHash, ProgramId, ProgramSet, Pulse, Recalled, Sample, StationId, StationSet, Step,
-        Time, Turn, Word, WriteId, encode,
+        ProgramHash, ProgramId, ProgramSet, Pulse, Recalled, Sample, Share, StationId, StationSet,
+        Step, Time, Turn, Word, WriteId, encode,
     };
 
     use super::*;
@@ -200,6 +200,7 @@ mod tests {
                 bound_by: latest,
                 modules: Some(Modules::Author {
                     outputs: Some(ones(bits)),
+                    share: Share::Whole,
                     answers: latest,
                     distrusted: [ones(bits), ones(bits)],
                 }),

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_remote_io::{PairedInput, PointPlace, SWITCHOVER, Wiring};
+use understudy_remote_io::{PairedInput, PointPlace, SWITCHOVER, SharedOutputs, Wiring};
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::Constant;
 use understudy_text::{Diagnostic, duration};
@@ -15,6 +15,9 @@ use crate::cluster::{PlantPlace, RemoteIo, Twin};
 use crate::device::{Connection, FieldDevice, SerialLine};
 use crate::fields::{ConnectionText, MAXIMUM_MISFITS};
 use crate::file::{FieldSection, TwinSection};
+
+/// Periods after which a device is not written any more with outputs that were driven.
+const OUTPUTS_LAST: u32 = 2;
 
 /// Reads a twin of a remote I/O; nothing where it has no name, which is reported.
 pub(super) fn read(
@@ -28,7 +31,9 @@ pub(super) fn read(
     names.listen(&section.addresses, diagnostics);
     check_host(&section, remote_io, diagnostics);
     check_keys(&section, diagnostics);
+    let mut shared_outputs = SharedOutputs::default();
     let (paired_inputs, device) = if section.is_parallel {
+        shared_outputs = read_shares(&section, remote_io, member, period, diagnostics);
         check_outputs(&section, remote_io, member, diagnostics);
         let device = own_device(&section, remote_io, field, diagnostics);
         (paired_inputs(&section, member, diagnostics), device)
@@ -46,6 +51,7 @@ pub(super) fn read(
             false => Wiring::Exclusive,
         },
         paired_inputs,
+        shared_outputs,
         field: device,
         addresses: section.addresses.map(|address| address.value),
     })
@@ -166,15 +172,23 @@ fn check_outputs(
         return;
     };
     let is_number = |of: Elementary| of != Elementary::Bool && !of.is_bit_string();
+    let is_shared = |name: &str| section.share.contains_key(name);
     let numbers = interface.outputs.iter().filter(|output| is_number(output.of));
+    let numbers = numbers.filter(|output| !is_shared(&output.name));
     for output in numbers.take(MAXIMUM_MISFITS) {
         let message = format!(
             "`{}` is {}, and two modules through diodes drive outputs of bits only",
             output.name, output.of
         );
         let found = Diagnostic::error("U0260", message, section.span.clone());
-        diagnostics
-            .push(found.with_help("use wiring \"exclusive\" for a program with this output"));
+        let help = match SharedOutputs::can_share(output.of) {
+            true => format!(
+                "add `share = {{ {} = \"half\" }}` where the currents of the two modules add up, or use wiring \"exclusive\"",
+                output.name
+            ),
+            false => "use wiring \"exclusive\" for a program with this output".to_owned(),
+        };
+        diagnostics.push(found.with_help(help));
     }
     let safe = &remote_io.fallback.fail_safe;
     let is_set = |first: u32, bits: u32| {
@@ -188,6 +202,58 @@ fn check_outputs(
         );
         diagnostics.push(Diagnostic::warning("U0261", message, section.span.clone()));
     }
+}
+
+/// Numbers that the modules of both drive together.
+fn read_shares(
+    section: &TwinSection,
+    remote_io: &RemoteIo,
+    member: &Member,
+    period: Duration,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> SharedOutputs {
+    let Some((_, interface)) = &member.code else {
+        return SharedOutputs::default();
+    };
+    let device = remote_io.field.as_ref();
+    let mut places: Vec<PointPlace> = Vec::new();
+    for (name, (span, how)) in &section.share {
+        let mut refuse = |code, message: String, span: &Range<usize>, help: String| {
+            diagnostics.push(Diagnostic::error(code, message, span.clone()).with_help(help));
+        };
+        let Some(output) = interface.outputs.iter().find(|output| output.name == *name) else {
+            let message = format!("`{}` has no output `{name}`", member.name);
+            let help = suggestion(name, interface.outputs.names());
+            refuse("U0209", message, span, help);
+            continue;
+        };
+        let has_offset = device.is_some_and(|device| {
+            let mut bindings = device.outputs.bindings.iter();
+            bindings.any(|it| it.name == *name && it.place.has_offset())
+        });
+        if !SharedOutputs::can_share(output.of) {
+            let message = format!("`{name}` is {}: only a number has a share", output.of);
+            refuse("U0204", message, span, "remove it from `share`".to_owned());
+        } else if how.value != "half" {
+            let message = format!("`{}` is no share", how.value);
+            refuse("U0207", message, &how.span, "write \"half\"".to_owned());
+        } else if has_offset {
+            let message = format!(
+                "`{name}` has an `offset`, so two halves of it are not the current of the whole"
+            );
+            let help = "let the module begin at 0 mA, and the program compute what it drives";
+            refuse("U0260", message, span, help.to_owned());
+        } else {
+            places.push(PointPlace::of(output));
+        }
+    }
+    places.sort_by_key(|place| place.bit);
+    // A device is written for as long as one exchange takes, and for some periods before.
+    let delay = device.map_or(0, |device| {
+        let exchange = device.timeout.as_nanos().div_ceil(period.as_nanos().max(1));
+        OUTPUTS_LAST.saturating_add(u32::try_from(exchange).unwrap_or(u32::MAX))
+    });
+    SharedOutputs { places, delay }
 }
 
 /// All inputs of the program, with their tolerances.

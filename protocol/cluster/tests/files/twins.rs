@@ -2,6 +2,7 @@
 
 use understudy_cluster::Cluster;
 use understudy_remote_io::Wiring;
+use understudy_typed::Elementary;
 use understudy_wire::ProgramId;
 
 use crate::common::{findings, load};
@@ -134,11 +135,65 @@ fn twins_with_modules_of_their_own() {
     for number in ["REAL", "INT", "TIME"] {
         wrong("", "", number, "U0260");
     }
+    let half = ", share = { pump = \"half\" }";
+    wrong(half, "", "BOOL", "U0204");
+    wrong(half, "", "WORD", "U0204");
+    wrong(half, "", "TIME", "U0204");
+    wrong(", share = { pump = \"same\" }", "", "REAL", "U0207");
+    wrong(", share = { pum = \"half\" }", "", "REAL", "U0209");
+    wrong(", share = { pum = \"half\" }", "", "REAL", "U0260");
     let (cluster, found) = parallel("", "", "WORD");
     assert!(cluster.is_some(), "{found}");
     wrong("", "fail_safe = { pump = true }\n", "BOOL", "U0261");
     let keys = "name = \"tank-io-2\", wiring = \"exclusive\", discrepancy_cycles = 9";
     let text = format!("{CELL}[[remote_io]]\ncontroller = \"tank\"\ntwin = {{ {keys} }}\n");
     let found = findings(&load(&text, &[("tank.st", &tank("BOOL"))]).reports);
+    assert!(found.contains("U0259"), "{found}");
+}
+
+/// Numbers that the modules of both drive together, by the device and without one: how long a module may drive what it was told depends on its device.
+#[test]
+fn numbers_that_two_modules_share() {
+    let half = ", share = { pump = \"half\" }";
+    let (cluster, found) = parallel(half, "", "INT");
+    assert!(!found.contains("error"), "{found}");
+    let cluster = cluster.expect("a cluster");
+    for settings in [cluster.remote_io_settings(ProgramId(0)), cluster.twin_settings(ProgramId(0))]
+    {
+        let shared = settings.expect("a remote I/O").shared_outputs;
+        assert_eq!((shared.places.len(), shared.delay), (1, 0));
+        assert_eq!((shared.places[0].bit, shared.places[0].of), (0, Elementary::Int));
+    }
+    // The modules of a simulated plant keep what they were told for as long as its watchdog says: 4 cycles are needed.
+    let twin = format!("twin = {{ name = \"tank-io-2\", wiring = \"parallel\"{half} }}");
+    let text = format!(
+        "{CELL}[[remote_io]]\ncontroller = \"tank\"\n{twin}\n\
+         [[plant]]\nname = \"basin\"\ncontroller = \"tank\"\nladder = \"basin.st\"\nwatchdog_cycles = 20\n"
+    );
+    let basin = "PROGRAM basin\nVAR_INPUT\n pump : INT;\nEND_VAR\nVAR_OUTPUT\n level : REAL;\n count : INT;\n full : BOOL;\nEND_VAR\n\
+         full := pump > 5;\nEND_PROGRAM\n";
+    let loaded = load(&text, &[("tank.st", &tank("INT")), ("basin.st", basin)]);
+    let slow = loaded.cluster.unwrap_or_else(|| panic!("{}", findings(&loaded.reports)));
+    let settings = slow.remote_io_settings(ProgramId(0)).expect("a remote I/O");
+    assert_eq!(settings.shared_outputs.delay, 16);
+    let other = parallel(", share = { pump = \"half\" }, discrepancy_cycles = 7", "", "INT").0;
+    let hash = |cluster: &Cluster| cluster.agreement().configuration;
+    assert_ne!(hash(&cluster), hash(&other.expect("a cluster")));
+    let field = |more: &str| {
+        let field = FIELD.replace("\"coil:0\"", more);
+        let twin = format!("{half}, modbus = \"10.0.1.61:502\"");
+        parallel(&twin, &format!("{field}timeout = \"25ms\"\n"), "INT")
+    };
+    let (cluster, found) = field("\"holding:0 int\"");
+    assert!(!found.contains("error"), "{found}");
+    let settings = cluster.expect("a cluster").remote_io_settings(ProgramId(0));
+    // Two periods until it is written, and an exchange of 25 ms at 10 ms.
+    assert_eq!(settings.expect("a remote I/O").shared_outputs.delay, 2 + 3);
+    let offset = "{ at = \"holding:0\", as = \"int\", offset = 4.0 }";
+    let (_, found) = field(offset);
+    assert!(found.contains("U0260") && found.contains("has an `offset`"), "{found}");
+    let keys = "name = \"tank-io-2\", wiring = \"exclusive\", share = { pump = \"half\" }";
+    let text = format!("{CELL}[[remote_io]]\ncontroller = \"tank\"\ntwin = {{ {keys} }}\n");
+    let found = findings(&load(&text, &[("tank.st", &tank("INT"))]).reports);
     assert!(found.contains("U0259"), "{found}");
 }

@@ -5,17 +5,20 @@
 //!   long as a switchover may take ([`PairSettings::lasting`]), and then releases them: they are 0. So do those of an author that steps aside.
 //! - **Inputs.** The follower sends what its modules show, and u(i) is made of both ([`PairedInputs`]).
 //!
+//! - **Numbers** that the modules of both drive together add up: each drives a part ([`Sharing`]), and the author sends the other one its part.
+//!
 //! What is received counts where it answers a frame of the last [`AGE`] periods, so nothing is older, whatever the network and the hosts delay.
 //!
-//! Invariant: the modules of a follower drive what the author has driven in one of the last `lasting` + [`AGE`] periods, or 0.
+//! Invariant: the modules of a follower drive what the author has sent in one of the last `lasting` + [`AGE`] periods, or 0.
 
 use understudy_cycle::Output;
-use understudy_wire::{Image, Member, Modules as Sent, Pair, Part, Time};
+use understudy_wire::{Image, Member, Modules as Sent, Pair, Part, Share, Time};
 
 use super::super::RemoteIo;
 use crate::event::Event;
 use crate::paired_inputs::{InputChange, Module, PairedInputs};
 use crate::settings::{Settings, Wiring};
+use crate::sharing::{Lasts, Sharing};
 
 /// Age in periods up to which inputs and outputs of the other one count: those of the last deadline, where no frame is a period late.
 const AGE: u32 = 2;
@@ -28,8 +31,10 @@ pub(super) struct Modules {
     inputs: PairedInputs,
     /// The newest inputs of the other one.
     theirs: Option<Readings>,
-    /// Outputs that this author drives, until they are sent.
-    driven: Option<Image>,
+    /// Outputs that the other one drives, as this author has decided, until they are sent.
+    driven: Option<(Image, Share)>,
+    /// The parts of shared numbers; none where there are none.
+    sharing: Option<Sharing>,
     /// Outputs that this follower drives.
     followed: Option<Followed>,
     /// Modules that are not trusted, at the first remote I/O and at the twin, as the author has them.
@@ -50,6 +55,7 @@ struct Readings {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct Followed {
     outputs: Image,
+    share: Share,
     at: Time,
     /// When they were sent, on the clock of the author.
     sent: Time,
@@ -68,6 +74,7 @@ impl Modules {
             inputs,
             theirs: None,
             driven: None,
+            sharing: None,
             followed: None,
             answers: None,
         })
@@ -164,6 +171,12 @@ impl RemoteIo {
         let Some(modules) = &mut pairing.modules else {
             return;
         };
+        let share = modules.followed.as_ref().map(|followed| followed.share);
+        let known = share.map_or_else(
+            || Sharing::unknown(pairing.now),
+            |share| Sharing::following(pairing.now, share),
+        );
+        modules.sharing = Some(known).filter(|_| !self.settings.shared_outputs.places.is_empty());
         modules.inputs = PairedInputs::new(paired, last);
         modules.inputs.distrust(paired, &modules.distrusted);
         modules.followed = None;
@@ -173,11 +186,30 @@ impl RemoteIo {
 
     // ── outputs ─────────────────────────────────────────────────────────────────────────────────────────────────────
 
-    /// Notes what this author drives, for the other one.
-    pub(in crate::remote_io) fn note_driven(&mut self, driven: &Image) {
-        if let Some(modules) = self.modules() {
-            modules.driven = Some(driven.clone());
-        }
+    /// Divides what this author drives between the modules of both. What its own drive; the other one is sent its part.
+    pub(in crate::remote_io) fn divide(&mut self, driven: &Image) -> Image {
+        let is_of_use = [self.sensors.is_some(), self.is_followed_by_modules()];
+        let period = self.period();
+        let shared = &self.settings.shared_outputs;
+        let Some(pairing) = &mut self.pairing else {
+            return driven.clone();
+        };
+        let Some(modules) = &mut pairing.modules else {
+            return driven.clone();
+        };
+        let is_twin = pairing.settings.is_twin;
+        let [own, other] = modules.sharing.as_mut().map_or([Share::Whole; 2], |sharing| {
+            let lasts = Lasts::of(period, pairing.settings.lasting(), shared.delay);
+            sharing.decide(pairing.now, is_of_use, lasts)
+        });
+        modules.driven = Some((shared.part(driven, other, !is_twin), other));
+        shared.part(driven, own, is_twin)
+    }
+
+    /// Whether the modules of the other one drive what they are sent, as far as it is known.
+    fn is_followed_by_modules(&self) -> bool {
+        let theirs = self.pairing.as_ref().and_then(|pairing| pairing.theirs.as_ref());
+        self.their_readings().is_some() && theirs.is_some_and(is_of_use)
     }
 
     /// An author that ends to be one knows best which modules are not trusted, until it receives the next author.
@@ -226,11 +258,15 @@ impl RemoteIo {
         let pairing = self.pairing.as_mut()?;
         let modules = pairing.modules.as_mut()?;
         Some(match pairing.part {
-            Part::Author => Sent::Author {
-                outputs: modules.driven.take(),
-                answers: modules.answers,
-                distrusted: modules.inputs.distrusted(&self.settings.paired_inputs),
-            },
+            Part::Author => {
+                let (outputs, share) = modules.driven.take().unzip();
+                Sent::Author {
+                    outputs,
+                    share: share.unwrap_or_default(),
+                    answers: modules.answers,
+                    distrusted: modules.inputs.distrusted(&self.settings.paired_inputs),
+                }
+            }
             Part::Follower | Part::TakingOver => {
                 Sent::Follower { inputs: self.sensors.clone(), follows: modules.followed.is_some() }
             }
@@ -258,7 +294,7 @@ impl RemoteIo {
                 let inputs = readings.clone().filter(|image| image.width() == inputs);
                 modules.theirs = Some(Readings { inputs, at: now, is_new: true });
             }
-            Sent::Author { outputs: driven, answers, distrusted }
+            Sent::Author { outputs: driven, share, answers, distrusted }
                 if pairing.part != Part::Author && is_present(*answers) =>
             {
                 if distrusted.iter().all(|image| image.width() == inputs) {
@@ -268,9 +304,12 @@ impl RemoteIo {
                     modules.followed.as_ref().is_none_or(|before| theirs.sent > before.sent);
                 let driven = driven.as_ref().filter(|image| image.width() == outputs && is_newer);
                 if let Some(outputs) = driven.cloned() {
-                    let followed =
-                        Followed { outputs: outputs.clone(), at: now, sent: theirs.sent };
-                    modules.followed = Some(followed);
+                    modules.followed = Some(Followed {
+                        outputs: outputs.clone(),
+                        share: *share,
+                        at: now,
+                        sent: theirs.sent,
+                    });
                     self.member.put(Output::Follow(outputs));
                 }
             }
