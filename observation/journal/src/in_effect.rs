@@ -1,7 +1,7 @@
 //! The records that are in effect: of all that happened once, the newest of each kind about each subject, until it is over.
 //!
 //! Whoever takes them in their order knows the processes, cuts, forces, exclusions and losses of the present as whoever read everything.
-//! Invariant: their number is bounded by the members of the cluster, whatever happens in a run.
+//! Invariant: their number is bounded by the members of the cluster and [`MOST_CHANGES`], whatever happens in a run.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -37,6 +37,11 @@ pub(crate) struct InEffect {
     /// Stations that have not published since they joined or adopted a state.
     joining: BTreeSet<Option<Member>>,
 }
+
+/// Online changes among them, at most: the newest.
+const MOST_CHANGES: usize = 16;
+
+const CHANGE_LOADED: &str = "change-loaded";
 
 /// What a station reports before its first turn, and is over with it.
 const BEFORE_TURNS: [&str; 2] = ["joins", "adopted"];
@@ -91,10 +96,27 @@ impl InEffect {
 
     fn replaces(&mut self, subject: Subject, record: &Record, cycle: i64) {
         self.count += 1;
+        let is_change = subject.1 == CHANGE_LOADED;
         if let Some(before) = self.by_subject.insert(subject, self.count) {
             self.records.remove(&before);
         }
         self.records.insert(self.count, (cycle, record.clone()));
+        if is_change {
+            self.forget_old_changes();
+        }
+    }
+
+    fn forget_old_changes(&mut self) {
+        let of_changes = |((_, kind, _), _): &(&Subject, &u64)| *kind == CHANGE_LOADED;
+        let changes = || self.by_subject.iter().filter(of_changes);
+        let oldest = changes().min_by_key(|(_, number)| **number);
+        if changes().count() > MOST_CHANGES
+            && let Some((subject, number)) =
+                oldest.map(|(subject, number)| (subject.clone(), *number))
+        {
+            self.by_subject.remove(&subject);
+            self.records.remove(&number);
+        }
     }
 
     /// With their cycles, oldest first.
@@ -222,7 +244,10 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
 
 fn of_run(event: &RunEvent) -> Option<Subject> {
     Some(match event {
-        RunEvent::ChangeLoaded { .. } => (None, "change-loaded", String::new()),
+        // One change may begin where another one has led.
+        RunEvent::ChangeLoaded { texts } => {
+            (None, CHANGE_LOADED, [texts.before, texts.after].map(|it| it.to_string()).join(" "))
+        }
         RunEvent::Started { member } | RunEvent::Ended { member, .. } => {
             (Some(*member), "process", String::new())
         }

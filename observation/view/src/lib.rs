@@ -43,6 +43,7 @@ mod terminal;
 mod timeline;
 mod timing;
 mod value;
+mod version;
 mod why;
 mod zone;
 

@@ -42,9 +42,9 @@ impl Model {
                 self.check_words(*moment);
                 return;
             }
-            StationEvent::Holds { moment, program, changed, lineage, state } => {
+            StationEvent::Holds { moment, program, of, lineage, state } => {
                 if let Some(history) = self.histories.get_mut(program.index()) {
-                    history.holds(*moment, (*changed, *lineage), state);
+                    history.holds(*moment, (*of, *lineage), state);
                 }
                 return;
             }

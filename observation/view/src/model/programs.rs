@@ -16,6 +16,7 @@ use crate::describe::{
 };
 use crate::event::{Event, Level};
 use crate::stop::{self, Stop};
+use crate::version::Version;
 
 /// The alarm of forced signals.
 const FORCED: &str = "forced";
@@ -91,9 +92,10 @@ impl Model {
             }
             _ => self.cycles.of(moment(&record.event)),
         };
-        if !self.cycles.is_fixed()
-            && let Some(violation) =
-                self.histories[place].note(cycle, member, Time(record.at_ns), event)
+        if self.cycles.is_fixed() {
+            self.histories[place].learn_running(event);
+        } else if let Some(violation) =
+            self.histories[place].note(cycle, member, Time(record.at_ns), event)
         {
             self.violated(record, cycle, &violation.to_string());
         }
@@ -310,7 +312,8 @@ impl Model {
         let subject = (record.name.clone(), PROGRAM_FAULT);
         self.alarms.over(&subject, cycle);
         if let stop::Change::Stopped(fault) = change {
-            let text = program_fault_text(&self.cluster, program, fault.as_ref());
+            let version = self.running_version(program);
+            let text = program_fault_text(version.map(Version::controller), fault.as_ref());
             let is_first = self.programs[program.index()].source.is_none();
             if self.read_from.is_some() && is_first {
                 // It is not known when it occurred.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use understudy_cycle::OnlineChange;
 use understudy_journal::{Action, Command, Process, Record, RunEvent};
 use understudy_wire::Member;
 
@@ -88,6 +89,7 @@ impl Model {
             }
             RunEvent::ChangeLoaded { texts } => {
                 if let Some(change) = self.online_changes.load(texts) {
+                    self.learn_programs(&change);
                     let change = Arc::new(change);
                     self.histories.iter_mut().for_each(|history| history.learn(&change));
                 }
@@ -100,6 +102,19 @@ impl Model {
             | RunEvent::InEffect { .. } => {}
         }
         self.happened(record, cycle, None);
+    }
+
+    /// Scans are explained by the programs of a change too.
+    fn learn_programs(&mut self, change: &OnlineChange) {
+        for changed in &change.programs {
+            let Some(versions) = self.versions.get_mut(changed.program.index()) else {
+                continue;
+            };
+            for hash in [changed.before.hash, changed.after.hash] {
+                let found = self.online_changes.controller(changed.program, hash);
+                found.into_iter().for_each(|controller| versions.learn(controller));
+            }
+        }
     }
 
     fn fault(&mut self, action: Action, member: Member, cycle: i64) {

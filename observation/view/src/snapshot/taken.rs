@@ -293,8 +293,8 @@ impl Picture<'_> {
     fn fault(&self, program: ProgramId) -> Option<String> {
         let step = self.model.deadline(program, self.cycle?)?;
         let fault = step.sampled.as_ref()?.fault?;
-        let cluster = self.model.cluster();
-        Some(program_fault_text(cluster, program, Some(&fault)))
+        let controller = self.model.controller_at(program, Some(step.cycle));
+        Some(program_fault_text(controller, Some(&fault)))
     }
 
     fn values(&self, program: ProgramId, driven: Option<&Driven>) -> BTreeMap<String, Value> {
