@@ -226,6 +226,11 @@ impl ChangeTexts {
         programs.chain(self.fallbacks.iter().map(|changed| changed.program)).collect()
     }
 
+    /// The programs before and after, as records of members keep them.
+    pub fn kept_programs(&self) -> impl Iterator<Item = RetainedProgram> {
+        self.programs.iter().flat_map(|changed| [changed.before.kept(), changed.after.kept()])
+    }
+
     /// The change back.
     #[must_use]
     pub fn back(self) -> Self {
