@@ -261,6 +261,22 @@ fn what_is_kept_after_a_change_can_be_taken_over() {
     for word in ["prepare", "accept"] {
         let (exit, document, errors) = answer(&["change", run_text, &after, word, "--drop"]);
         assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+        // Each viewer knows where the members are.
+        let shown = |document: &Value| {
+            let change = &document["result"]["change"];
+            let members = change["members"].as_array().into_iter().flatten();
+            let places: Vec<&Value> = members.map(|member| &member["place"]).collect();
+            let is_prepared = places.len() == 5 && places.iter().all(|it| *it == "prepared");
+            if word == "prepare" { is_prepared } else { change.is_null() }
+        };
+        let deadline = Instant::now() + DEADLINE;
+        loop {
+            let (_, document, _) = answer(&["top", run_text]);
+            if shown(&document) {
+                break;
+            }
+            assert!(Instant::now() < deadline, "{word}: {document:#}");
+        }
     }
     records.wait_for("the change", |record| is(record, "counter-io", "program-changed"));
     ended_well(child, &runs, &run);

@@ -15,6 +15,7 @@ use crate::describe::{
     source_text,
 };
 use crate::event::{Event, Level};
+use crate::online_change::ChangeReport;
 use crate::stop::{self, Stop};
 use crate::version::Version;
 
@@ -174,9 +175,10 @@ impl Model {
                 None
             }
             // The engineer has moved the change on.
-            RemoteIoEvent::Configured(_) => {
+            RemoteIoEvent::Configured(configurations) => {
                 self.alarms.all_over(&record.name, &[CHANGE_TAKEN_BACK], cycle);
-                None
+                let by = record.member.unwrap_or(Member::RemoteIo(program));
+                Some(Change::Online(ChangeReport::Configured(by, *configurations)))
             }
             RemoteIoEvent::AdoptedLineage { .. } | RemoteIoEvent::StateRecovered { .. } => {
                 self.alarms.all_over(&record.name, &QUESTIONS, cycle);

@@ -10,6 +10,7 @@ use super::Model;
 use super::standing::{Change, StationChange};
 use crate::alarm::UNPROTECTED;
 use crate::describe::fault_text;
+use crate::online_change::{ChangeReport, LoadedChange};
 
 /// The alarm of a simulated plant that has ended.
 const ENDED: &str = "ended";
@@ -87,7 +88,18 @@ impl Model {
                     history.asked(write);
                 }
             }
+            RunEvent::Commanded {
+                command: Command::Change { request },
+                owner,
+                refused: None,
+                ..
+            } => {
+                let (by, request) = (owner.clone(), request.clone());
+                self.changes.push(cycle, Change::Online(ChangeReport::Given { by, request }));
+            }
             RunEvent::ChangeLoaded { texts } => {
+                let loaded = ChangeReport::Loaded(LoadedChange::of(texts));
+                self.changes.push(cycle, Change::Online(loaded));
                 if let Some(change) = self.online_changes.load(texts) {
                     self.learn_programs(&change);
                     let change = Arc::new(change);

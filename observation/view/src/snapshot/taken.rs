@@ -133,6 +133,7 @@ impl Picture<'_> {
                 true => model.spares_in(self.standing),
                 false => Vec::new(),
             },
+            change: model.change_in(self.standing, self.cycle),
             host_stalls: self.host_stalls(),
             alarms,
             process_alarms,

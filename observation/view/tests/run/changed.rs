@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use serde_json::Value;
 use understudy_cluster::{ChangeTexts, Cluster, read};
-use understudy_journal::{Happening, Journal, Members, Record, RunEvent, keep_cluster};
+use understudy_journal::{Command, Happening, Journal, Members, Record, RunEvent, keep_cluster};
 use understudy_remote_io::Event;
 use understudy_simulator::{
     Action, ChangeStep, Fault, Network, Parts, Record as Simulated, Simulation, parts,
 };
 use understudy_testing::Folder;
 use understudy_view::{Bounds, Filter, Listing, Model, Reason, Run, Trouble};
-use understudy_wire::{Member, Moment, ProgramId, StationId, Time};
+use understudy_wire::{ChangeRequest, Member, Moment, ProgramId, StationId, Time};
 
 const CLUSTER: &str = r#"
 [cluster]
@@ -314,4 +314,61 @@ fn the_program_that_runs_is_known_from_the_middle_of_a_journal() {
     let (lines, _) = model.text_at(COUNTER, newest).expect("a text");
     assert_eq!(lines.len(), 10);
     assert!(model.state_signals(COUNTER).iter().any(|signal| signal.name == "added"));
+}
+
+/// Each view shows which members have taken which step, while the change goes on.
+#[test]
+fn a_change_that_goes_on_is_shown_with_the_place_of_each_member() {
+    let at = |cycle, member, step| Fault {
+        at_cycle: cycle,
+        phase: 0.3,
+        member,
+        action: Action::Change { step },
+    };
+    let [counter, understudy, remote_io] = MEMBERS;
+    let faults = [
+        at(10, counter, ChangeStep::Prepare),
+        at(20, understudy, ChangeStep::Prepare),
+        at(20, remote_io, ChangeStep::Prepare),
+        at(30, remote_io, ChangeStep::Switch),
+        at(60, remote_io, ChangeStep::Accept),
+        at(70, counter, ChangeStep::Accept),
+        at(70, understudy, ChangeStep::Accept),
+        at(90, counter, ChangeStep::Forget),
+        at(100, understudy, ChangeStep::Forget),
+        at(100, remote_io, ChangeStep::Forget),
+    ];
+    let (cluster, mut records) = records("counter.st", [BEFORE, AFTER], &faults);
+    // The engineer's step stands before what it does.
+    let given = RunEvent::Commanded {
+        member: remote_io,
+        command: Command::Change { request: ChangeRequest::Prepare { file: "change.json".into() } },
+        owner: "anna".to_owned(),
+        reason: "an online change".to_owned(),
+        refused: None,
+    };
+    let first = records.iter().position(|record| {
+        matches!(record.event, Happening::Station(understudy_node::Event::Configured(_)))
+    });
+    let first = first.expect("it is prepared");
+    let given = Record::of_run(records[first].at_ns, given);
+    records.insert(first, given);
+    let model = model(&cluster, &records);
+    let text = |cycle: i64| {
+        let change = model.snapshot_at(cycle).expect("known").change;
+        change.map(|change| change.text())
+    };
+    assert_eq!(text(5), None);
+    let begins = |cycle: i64, expected: &str| {
+        let text = text(cycle).expect("it goes on");
+        assert!(text.starts_with("prepare by anna in cycle 1"), "{text}");
+        assert!(text.ends_with(expected), "{cycle}: {text}");
+    };
+    let (old, new) = ("counter runs the old program; ", "counter runs the new program; ");
+    begins(15, &format!("{old}not loaded: understudy, counter-io; prepared: counter"));
+    begins(25, &format!("{old}prepared: counter, understudy, counter-io"));
+    begins(50, &format!("{new}prepared: counter, understudy, counter-io"));
+    begins(65, &format!("{new}prepared: counter, understudy; accepted: counter-io"));
+    begins(95, &format!("{new}accepted: understudy, counter-io; ended: counter"));
+    assert_eq!(text(110), None);
 }
