@@ -335,6 +335,9 @@ fn ends(later: &Record, earlier: &Record) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use understudy_cluster::ChangeTexts;
+    use understudy_wire::ConfigurationHash;
+
     use super::*;
 
     /// A question is over once the program starts or the state is there again, in every order of the records.
@@ -374,5 +377,39 @@ mod tests {
             assert_eq!(records_not_over(asked.clone()), asked, "it is asked now");
             assert_eq!(records_not_over(vec![question, answer.clone()]), [answer]);
         }
+    }
+
+    /// One change begins where another one has led, so each that is in effect is kept, and one that is loaded again is the newest; a run of many changes
+    /// keeps the newest of them.
+    #[test]
+    fn the_newest_online_changes_are_in_effect() {
+        let mut in_effect = InEffect::default();
+        let mut load = |before: u64, after: u64| {
+            let texts = ChangeTexts {
+                cluster: 1,
+                before: ConfigurationHash(before),
+                after: ConfigurationHash(after),
+                programs: Vec::new(),
+                fallbacks: Vec::new(),
+            };
+            let loaded = RunEvent::ChangeLoaded { texts: Box::new(texts) };
+            in_effect.note(&Record::of_run(0, loaded), 0);
+            let records = in_effect.records().filter_map(|(_, record)| match &record.event {
+                Happening::Run(RunEvent::ChangeLoaded { texts }) => {
+                    Some((texts.before.0, texts.after.0))
+                }
+                _ => None,
+            });
+            records.collect::<Vec<_>>()
+        };
+        load(0, 1);
+        assert_eq!(load(1, 0), [(0, 1), (1, 0)]);
+        assert_eq!(load(0, 1), [(1, 0), (0, 1)]);
+        for number in 1..100 {
+            load(number, number + 1);
+        }
+        let kept = load(0, 1);
+        assert_eq!(kept.len(), MOST_CHANGES);
+        assert_eq!(kept[MOST_CHANGES - 2..], [(99, 100), (0, 1)]);
     }
 }

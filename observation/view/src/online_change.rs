@@ -1,4 +1,4 @@
-//! An online change that goes on: who has given which step, which members have taken it, and which programs have changed.
+//! An online change in progress: who has given which step, which members have taken it, and which programs have changed.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ pub(crate) struct LoadedChange {
     programs: Vec<(ProgramId, ProgramHash)>,
 }
 
-/// An online change that goes on.
+/// An online change in progress.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ChangeSnapshot {
     /// Hash of the configuration before.
@@ -174,7 +174,7 @@ impl ChangeStanding {
 }
 
 impl Model {
-    /// The online change that goes on in a cycle: as long as a member that is up has two configurations.
+    /// The online change in progress in a cycle: as long as a member that is up has two configurations.
     pub(crate) fn change_in(
         &self,
         standing: &Standing,

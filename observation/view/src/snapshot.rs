@@ -90,7 +90,7 @@ pub struct Snapshot {
     /// Spares that have reported to a member, in the present cycle.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub spares: Vec<SpareSnapshot>,
-    /// The online change that goes on.
+    /// The online change in progress.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<ChangeSnapshot>,
     /// Late wake-ups of all members so far.

@@ -95,7 +95,7 @@ function scenarioOver(state, run) {
   setText(place, `The scenario is over (${state.scenario_over}).${invitation}`);
 }
 
-// An online change that goes on. A program that is replaced by another one has other variables, and other lines or rungs.
+// An online change in progress. A program that is replaced by another one has other variables, and other lines or rungs.
 let hashes = "";
 
 function online({ change, programs }, live) {

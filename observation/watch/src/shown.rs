@@ -44,7 +44,7 @@ pub(crate) struct State {
     past: Option<Past>,
     /// What the scenario came to, where it is over and the cluster stays up.
     scenario_over: Option<String>,
-    /// The online change that goes on, in words.
+    /// The online change in progress, in words.
     change: Option<String>,
     cycle_master: Option<String>,
     members: Vec<ShownMember>,

@@ -316,9 +316,9 @@ fn the_program_that_runs_is_known_from_the_middle_of_a_journal() {
     assert!(model.state_signals(COUNTER).iter().any(|signal| signal.name == "added"));
 }
 
-/// Each view shows which members have taken which step, while the change goes on.
+/// Each view shows which members have taken which step, while the change is in progress.
 #[test]
-fn a_change_that_goes_on_is_shown_with_the_place_of_each_member() {
+fn a_change_in_progress_is_shown_with_the_place_of_each_member() {
     let at = |cycle, member, step| Fault {
         at_cycle: cycle,
         phase: 0.3,
