@@ -28,9 +28,9 @@ pub enum Event {
         moment: Moment,
         /// Program of the state.
         program: ProgramId,
-        /// Hash of that program: another one than that of its cluster file after an online change.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        changed: Option<ProgramHash>,
+        /// Hash of that program; nothing in journals of earlier releases, where it is that of the cluster file.
+        #[serde(default, alias = "changed", skip_serializing_if = "Option::is_none")]
+        of: Option<ProgramHash>,
         /// Lineage of the state.
         lineage: Lineage,
         /// x(t+1).

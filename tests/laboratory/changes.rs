@@ -235,10 +235,64 @@ fn a_renamed_variable_keeps_its_value() {
     let counts = ended_well(child, &runs, &run);
     let steps = steps(&counts);
     assert_eq!(steps, [1, 10, 100], "{steps:?}");
-    // A view has the program with which the run began, and says so.
-    let (exit, document, _) = answer(&["why", "counter.shown", run_text]);
-    let why = document["failures"][0]["message"].as_str().unwrap_or_default();
-    assert!(exit != 0 && why.contains("an online change has replaced its program"), "{document:#}");
+    // What was driven last is explained by the program of the second change.
+    let (exit, document, errors) = answer(&["why", "counter.shown", run_text]);
+    assert_eq!(exit, 0, "{document:#} {errors}");
+    let read = &document["result"]["because"]["because"][0];
+    assert_eq!(read["signal"], "total", "{document:#}");
+    assert_eq!(read["statement"], "total := total + 100;", "{document:#}");
+}
+
+/// After an acceptance members keep records of the new program, and its text next to them: the next program takes its values over, whichever it is.
+#[test]
+fn what_is_kept_after_a_change_can_be_taken_over() {
+    let _one = some_at_a_time();
+    let out = empty_folder("changes-retained");
+    let retained = |step: u32| counter("DINT", step).replace("VAR count", "VAR RETAIN count");
+    let before = write_cluster(&out.join("before"), &retained(1));
+    let after = write_cluster(&out.join("after"), &retained(10).replace("count", "total"));
+    let third = write_cluster(&out.join("third"), &retained(100).replace("count", "total"));
+    let runs = out.join("runs");
+    let more = ["--cycles", "100000", "--allow-commands"];
+    let (child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    let mut records = Records::of(&run);
+    let run_text = run.to_str().expect("text");
+    for word in ["prepare", "accept"] {
+        let (exit, document, errors) = answer(&["change", run_text, &after, word, "--drop"]);
+        assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+        // Each viewer knows where the members are.
+        let shown = |document: &Value| {
+            let change = &document["result"]["change"];
+            let members = change["members"].as_array().into_iter().flatten();
+            let places: Vec<&Value> = members.map(|member| &member["place"]).collect();
+            let is_prepared = places.len() == 5 && places.iter().all(|it| *it == "prepared");
+            if word == "prepare" { is_prepared } else { change.is_null() }
+        };
+        let deadline = Instant::now() + DEADLINE;
+        loop {
+            let (_, document, _) = answer(&["top", run_text]);
+            if shown(&document) {
+                break;
+            }
+            assert!(Instant::now() < deadline, "{word}: {document:#}");
+        }
+    }
+    records.wait_for("the change", |record| is(record, "counter-io", "program-changed"));
+    ended_well(child, &runs, &run);
+    let folder = run.join("retained");
+    let folder = folder.to_str().expect("text");
+    let (exit, document, errors) = answer(&["retained", "show", folder, "--for", &third]);
+    assert_eq!(exit, 0, "{document:#} {errors}");
+    let members = document["result"]["members"].as_array().expect("members");
+    let stations: Vec<&Value> =
+        members.iter().filter(|member| !member["program"].is_null()).collect();
+    assert_eq!(stations.len(), 2, "{document:#}");
+    for station in stations {
+        assert_eq!(station["problems"], serde_json::json!([]), "{document:#}");
+        let values = station["values"].as_array().expect("values");
+        assert!(values.iter().any(|it| it["path"] == "total" && it["fate"] == "kept"));
+    }
 }
 
 /// A new program that a fault stops in its eighth scan: it is taken back, the plant misses the cycle of the fault, and the change can be cancelled only.

@@ -109,6 +109,31 @@ fn a_browser_shows_text_and_function_blocks_with_values() {
     drive("numbers", cluster, "numbers.mjs", |_| Vec::new());
 }
 
+/// A counter by `step`, with a cluster of it.
+fn counter(folder: &Path, name: &str, step: u32, variable: &str) -> String {
+    let folder = folder.join(name);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let program = format!(
+        "PROGRAM counter\n  VAR_INPUT go : BOOL; END_VAR\n  VAR_OUTPUT shown : DINT; END_VAR\n  VAR count : DINT; {variable} END_VAR\n  count := count + {step};\n  shown := count;\nEND_PROGRAM\n"
+    );
+    let cluster = "[cluster]\nname = \"changed\"\nperiod = \"50ms\"\nsecurity = \"off\"\n\n[[controller]]\nname = \"counter\"\nladder = \"counter.st\"\n\n[[remote_io]]\ncontroller = \"counter\"\n";
+    let file = folder.join("cluster.toml");
+    std::fs::write(folder.join("counter.st"), program).expect("written");
+    std::fs::write(&file, cluster).expect("written");
+    file.to_str().expect("text").to_owned()
+}
+
+#[test]
+fn a_browser_shows_an_online_change_and_the_program_that_runs() {
+    let files = empty_folder("changed-files");
+    let before = counter(&files, "before", 1, "");
+    let after = counter(&files, "after", 10, "added : INT := 5;");
+    let run = files.with_file_name("changed").join("runs/latest");
+    let run = run.to_str().expect("text").to_owned();
+    let binary = env!("CARGO_BIN_EXE_understudy").to_owned();
+    drive("changed", &before, "changed.mjs", |_| vec![binary.clone(), run.clone(), after.clone()]);
+}
+
 /// The press cell with 90 more rungs in the robot, which are a chain of memory bits, a timer of the arm's laps and a counter of them.
 fn large_cell(folder: &Path) -> String {
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/press-cell");

@@ -71,7 +71,7 @@ impl Differences {
         let programs = texts.programs.iter().map(|changed| {
             let place = changed.program.index();
             let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
-            let state = live.map(|live| live.newest_state(changed.program));
+            let state = live.map(|live| live.newest_state(changed.program, old.hash));
             let (state, no_state) = match state {
                 Some(Ok(state)) => (Some(state), None),
                 Some(Err(error)) => (None, Some(error.to_string())),

@@ -152,10 +152,22 @@ impl Referee {
         self.change = Some(Arc::clone(change));
     }
 
-    /// Whether a state that is remembered is one of the first program, and not of one that it has changed to.
-    pub fn is_of_first(&self, lineage: Lineage) -> bool {
-        let place = self.place_of(lineage);
-        place.is_some_and(|place| self.states[place].program == self.program.hash)
+    /// The program that takes a step from the state of a lineage, and its state before the step, where they are known.
+    pub fn taken(&self, before: Lineage, step: &Step) -> Option<(ProgramHash, Image)> {
+        self.taken_from(self.place_of(before)?, step)
+    }
+
+    /// The program of the state of a lineage, where it is remembered.
+    pub fn program_of(&self, lineage: Lineage) -> Option<ProgramHash> {
+        Some(self.states[self.place_of(lineage)?].program)
+    }
+
+    /// Whether a state is the one in which a program begins that is started cold.
+    pub fn is_initial(&self, program: ProgramHash, state: &Image) -> bool {
+        let program = self.versions().of(program);
+        program.is_some_and(|it| {
+            it.executable.state_count() == state.width() && it.executable.initial() == state.words()
+        })
     }
 
     fn versions(&self) -> Versions<'_> {
@@ -188,16 +200,16 @@ impl Referee {
         self.gaps
     }
 
-    /// A station reports the state that it holds after the sample of `moment`, of another program than the first where that has changed. It counts only
-    /// where nothing else is known.
+    /// A station reports the state that it holds after the sample of `moment`, of the program with a hash, or of the first one. It counts only where
+    /// nothing else is known.
     pub fn holds(
         &mut self,
         moment: Moment,
-        (changed, lineage): (Option<ProgramHash>, Lineage),
+        (of, lineage): (Option<ProgramHash>, Lineage),
         state: &Image,
     ) {
         if self.unjudged == Some((moment, lineage)) && self.blind {
-            self.goes_on_from((changed, lineage), state.clone());
+            self.goes_on_from((of, lineage), state.clone());
         }
     }
 
@@ -281,14 +293,10 @@ impl Referee {
         }
     }
 
-    /// The reference run goes on from a state that is known from elsewhere, for want of a start that was seen; of another program than the first where
-    /// that has changed. One that is not known here says nothing.
-    pub fn goes_on_from(
-        &mut self,
-        (changed, lineage): (Option<ProgramHash>, Lineage),
-        bits: Image,
-    ) {
-        let hash = changed.unwrap_or(self.program.hash);
+    /// The reference run goes on from a state that is known from elsewhere, for want of a start that was seen: of the program with a hash, or of the
+    /// first one. A program that is not known here says nothing.
+    pub fn goes_on_from(&mut self, (of, lineage): (Option<ProgramHash>, Lineage), bits: Image) {
+        let hash = of.unwrap_or(self.program.hash);
         let fits = |program: &Program| program.executable.state_count() == bits.width();
         if !self.versions().of(hash).is_some_and(fits) {
             return;

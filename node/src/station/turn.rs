@@ -151,10 +151,8 @@ impl Station {
             });
             if let Some((lineage, state)) = state {
                 let (program, of) = (replica.id(), replica.last_step().program);
-                let first = self.settings.programs[program.index()].hash;
-                let changed = (of != first).then_some(of);
-                let state = state.clone();
-                self.report(Event::Holds { moment, program, changed, lineage, state });
+                let (of, state) = (Some(of), state.clone());
+                self.report(Event::Holds { moment, program, of, lineage, state });
             }
         }
     }

@@ -38,7 +38,8 @@ pub struct Followed {
 pub struct Observation {
     /// The snapshot that every view shows.
     pub snapshot: Arc<Snapshot>,
-    /// By program: x(i) at its last sample, element 1 first; nothing where the journal does not contain it.
+    /// By program: x(i) at its last sample, element 1 first; nothing where the journal does not contain it, and where an online change has replaced the
+    /// program with which the run began.
     pub states: Vec<Option<Vec<bool>>>,
     /// The newest events, oldest first.
     pub recent: Vec<Event>,
@@ -68,7 +69,8 @@ impl Observation {
             let steps = model.history(program)?.steps().iter().rev();
             let mut steps = steps.filter(|step| step.cycle <= until);
             let sampled = steps.find_map(|step| step.sampled.as_ref())?;
-            Some(sampled.state.bits().collect())
+            let first = model.cluster().controllers().get(program.index())?.hash;
+            (sampled.program == first).then(|| sampled.state.bits().collect())
         };
         let mut recent: Vec<Event> = model.events().rev().take(RECENT).cloned().collect();
         recent.reverse();

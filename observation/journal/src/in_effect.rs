@@ -1,7 +1,7 @@
 //! The records that are in effect: of all that happened once, the newest of each kind about each subject, until it is over.
 //!
 //! Whoever takes them in their order knows the processes, cuts, forces, exclusions and losses of the present as whoever read everything.
-//! Invariant: their number is bounded by the members of the cluster, whatever happens in a run.
+//! Invariant: their number is bounded by the members of the cluster and [`MOST_CHANGES`], whatever happens in a run.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -37,6 +37,11 @@ pub(crate) struct InEffect {
     /// Stations that have not published since they joined or adopted a state.
     joining: BTreeSet<Option<Member>>,
 }
+
+/// Online changes among them, at most: the newest.
+const MOST_CHANGES: usize = 16;
+
+const CHANGE_LOADED: &str = "change-loaded";
 
 /// What a station reports before its first turn, and is over with it.
 const BEFORE_TURNS: [&str; 2] = ["joins", "adopted"];
@@ -91,10 +96,27 @@ impl InEffect {
 
     fn replaces(&mut self, subject: Subject, record: &Record, cycle: i64) {
         self.count += 1;
+        let is_change = subject.1 == CHANGE_LOADED;
         if let Some(before) = self.by_subject.insert(subject, self.count) {
             self.records.remove(&before);
         }
         self.records.insert(self.count, (cycle, record.clone()));
+        if is_change {
+            self.forget_old_changes();
+        }
+    }
+
+    fn forget_old_changes(&mut self) {
+        let of_changes = |((_, kind, _), _): &(&Subject, &u64)| *kind == CHANGE_LOADED;
+        let changes = || self.by_subject.iter().filter(of_changes);
+        let oldest = changes().min_by_key(|(_, number)| **number);
+        if changes().count() > MOST_CHANGES
+            && let Some((subject, number)) =
+                oldest.map(|(subject, number)| (subject.clone(), *number))
+        {
+            self.by_subject.remove(&subject);
+            self.records.remove(&number);
+        }
     }
 
     /// With their cycles, oldest first.
@@ -222,7 +244,10 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
 
 fn of_run(event: &RunEvent) -> Option<Subject> {
     Some(match event {
-        RunEvent::ChangeLoaded { .. } => (None, "change-loaded", String::new()),
+        // One change may begin where another one has led.
+        RunEvent::ChangeLoaded { texts } => {
+            (None, CHANGE_LOADED, [texts.before, texts.after].map(|it| it.to_string()).join(" "))
+        }
         RunEvent::Started { member } | RunEvent::Ended { member, .. } => {
             (Some(*member), "process", String::new())
         }
@@ -310,6 +335,9 @@ fn ends(later: &Record, earlier: &Record) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use understudy_cluster::ChangeTexts;
+    use understudy_wire::ConfigurationHash;
+
     use super::*;
 
     /// A question is over once the program starts or the state is there again, in every order of the records.
@@ -349,5 +377,39 @@ mod tests {
             assert_eq!(records_not_over(asked.clone()), asked, "it is asked now");
             assert_eq!(records_not_over(vec![question, answer.clone()]), [answer]);
         }
+    }
+
+    /// One change begins where another one has led, so each that is in effect is kept, and one that is loaded again is the newest; a run of many changes
+    /// keeps the newest of them.
+    #[test]
+    fn the_newest_online_changes_are_in_effect() {
+        let mut in_effect = InEffect::default();
+        let mut load = |before: u64, after: u64| {
+            let texts = ChangeTexts {
+                cluster: 1,
+                before: ConfigurationHash(before),
+                after: ConfigurationHash(after),
+                programs: Vec::new(),
+                fallbacks: Vec::new(),
+            };
+            let loaded = RunEvent::ChangeLoaded { texts: Box::new(texts) };
+            in_effect.note(&Record::of_run(0, loaded), 0);
+            let records = in_effect.records().filter_map(|(_, record)| match &record.event {
+                Happening::Run(RunEvent::ChangeLoaded { texts }) => {
+                    Some((texts.before.0, texts.after.0))
+                }
+                _ => None,
+            });
+            records.collect::<Vec<_>>()
+        };
+        load(0, 1);
+        assert_eq!(load(1, 0), [(0, 1), (1, 0)]);
+        assert_eq!(load(0, 1), [(1, 0), (0, 1)]);
+        for number in 1..100 {
+            load(number, number + 1);
+        }
+        let kept = load(0, 1);
+        assert_eq!(kept.len(), MOST_CHANGES);
+        assert_eq!(kept[MOST_CHANGES - 2..], [(99, 100), (0, 1)]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use understudy_cluster::{AlarmDeclaration, Cluster};
+use understudy_cluster::{AlarmDeclaration, Controller};
 use understudy_journal::{AlarmTransition, Cycles, Happening, Members, Record, source_word};
 use understudy_remote_io::Missing;
 use understudy_typed::Fault;
@@ -132,12 +132,7 @@ pub(crate) fn alarm_event(declared: &AlarmDeclaration, transition: AlarmTransiti
 }
 
 /// A program fault in words: the program, and where it stopped and why, as far as that is known.
-pub(crate) fn program_fault_text(
-    cluster: &Cluster,
-    program: ProgramId,
-    fault: Option<&Fault>,
-) -> String {
-    let controller = cluster.controllers().get(program.index());
+pub(crate) fn program_fault_text(controller: Option<&Controller>, fault: Option<&Fault>) -> String {
     let name = controller.map_or("an unknown program", |controller| controller.name.as_str());
     let typed = controller.map(|controller| controller.code.typed());
     match typed.zip(fault) {

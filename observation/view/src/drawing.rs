@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use understudy_diagram::Picture;
 use understudy_diagram::blocks::{Coil, Contacts, Kind, Network};
 use understudy_diagram::chart::Chart;
-use understudy_interchange::{Bodies, DrawnBody, drawn_units};
+use understudy_interchange::DrawnBody;
 use understudy_text::Lines;
 use understudy_typed::{
     Comparison, Done, Effect, Elementary, Made, Operation, Program, RealFunction, Trace,
@@ -26,22 +26,16 @@ impl Model {
         program: ProgramId,
         cycle: i64,
     ) -> Option<(String, Option<ViewError>)> {
-        let code = &self.cluster.controllers().get(program.index())?.code;
+        let version = self.version_in(program, Some(cycle))?;
+        let code = &version.controller().code;
         let (typed, text) = (code.typed(), code.source_text()?);
-        let units = self.drawings.get(program.index())?.get_or_init(|| {
-            // A document begins with a sign that no Structured Text begins with.
-            let name =
-                if text.trim_start().starts_with('<') { "program.xml" } else { "program.st" };
-            let units = drawn_units(name, text, Bodies::Blocks);
-            units.unwrap_or_default()
-        });
         let (trace, error) = match self.trace(program, cycle) {
             Ok(trace) => (Some(trace), None),
             Err(error) => (None, Some(error)),
         };
         let lines = Lines::new(text);
         let mut picture = Picture::new();
-        for unit in units.iter().filter(|unit| unit.is_program) {
+        for unit in version.drawing().iter().filter(|unit| unit.is_program) {
             let mut unit = unit.clone();
             let scan = trace.as_ref().map(|trace| Scan::new(typed, trace, &unit.name));
             if let Some(scan) = scan {

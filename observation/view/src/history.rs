@@ -4,6 +4,7 @@
 //! x(t), u(t) and the lineages before and after, so that a scan can be looked at as its station evaluated it.
 
 mod order;
+mod step;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,70 +12,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use understudy_cluster::Cluster;
 use understudy_cycle::OnlineChange;
-use understudy_remote_io::{Event, Missing};
+use understudy_remote_io::Event;
 use understudy_simulator::{Referee, Violation};
 use understudy_typed::{Fault, Program as TypedProgram};
 use understudy_wire::{
-    Image, Lineage, Member, Moment, ProgramHash, ProgramId, Source, StationId, StationSet, Time,
-    Write,
+    Image, Lineage, Member, Moment, ProgramHash, ProgramId, Source, Step as Taken, Time, Write,
 };
 
 use order::Order;
-
-/// A sample and its effect on the program.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Sampled {
-    /// u(t).
-    pub inputs: Image,
-    /// L(t).
-    pub before: Lineage,
-    /// x(t).
-    pub state: Image,
-    /// L(t+1).
-    pub after: Lineage,
-    /// h(x(t), u(t)).
-    pub outputs: Image,
-    /// The program fault in x(t+1), of a program with numbers.
-    pub fault: Option<Fault>,
-    /// Whether it occurred in this scan.
-    pub fault_is_new: bool,
-}
-
-/// The outputs at a deadline.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Driven {
-    /// y(i) as the device gets it, with the forced values.
-    pub outputs: Image,
-    /// y(i) before forces.
-    pub unforced: Image,
-    /// Source of the unforced outputs.
-    pub source: Source,
-    /// The station whose parity word they were reconstructed from.
-    pub word_of: Option<StationId>,
-    /// Why there was no provable output.
-    pub missing: Option<Missing>,
-    /// The stations that were received.
-    pub heard: StationSet,
-    /// u(i) as last sampled, in this cycle or before.
-    pub inputs: Option<Image>,
-    /// The fail-safe values of the remote I/O's configuration, where the outputs are fail-safe and these are known.
-    pub fail_safe: Option<Image>,
-}
-
-/// One cycle of one program.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Step {
-    /// From the origin of the run.
-    pub cycle: i64,
-    /// As the cluster counts it.
-    pub moment: Moment,
-    /// Nothing where no sample was taken, or where the state before it is not known.
-    pub sampled: Option<Sampled>,
-    /// Nothing before its deadline, or where the remote I/O died before it.
-    pub driven: Option<Driven>,
-    /// Whether no station received the sample, so that the program continued without it.
-    pub void: bool,
-}
+pub use step::{Driven, Sampled, Step};
 
 /// The last cycles of one program.
 #[derive(Debug, Clone)]
@@ -82,8 +28,12 @@ pub struct History {
     program: ProgramId,
     /// The remote I/O that has reported last.
     by: Member,
-    /// x(0).
-    initial: Option<Image>,
+    /// The program with which the run began.
+    first: ProgramHash,
+    /// The program that runs, as far as it is known.
+    running: ProgramHash,
+    /// Whether the state has a program fault of another program.
+    has_other_fault: bool,
     referee: Referee,
     steps: VecDeque<Step>,
     most: usize,
@@ -133,7 +83,9 @@ impl History {
         Some(Self {
             program,
             by: Member::RemoteIo(program),
-            initial: Image::from_words(executable.state_count(), executable.initial()).ok(),
+            first: settings.hash,
+            running: settings.hash,
+            has_other_fault: false,
             referee: Referee::new(&settings, executable),
             steps: VecDeque::new(),
             most: most.max(2),
@@ -172,9 +124,45 @@ impl History {
         self.steps.iter().rposition(|step| step.cycle == cycle)
     }
 
+    /// The program that took the newest sample up to the step at `place`.
+    pub(crate) fn program_at(&self, place: usize) -> ProgramHash {
+        let steps = self.steps.iter().take(place.saturating_add(1)).rev();
+        let sampled = steps.filter(|step| !step.void).find_map(|step| step.sampled.as_ref());
+        sampled.map_or(self.running, |sampled| sampled.program)
+    }
+
+    /// The place of the newest step up to that at `place` whose scan ended in a program fault.
+    pub(crate) fn fault_before(&self, place: usize) -> Option<usize> {
+        let is_new = |at: &usize| self.sampled_at(*at).is_some_and(|it| it.fault_is_new);
+        let found = (0..=place).rev().find(is_new);
+        if found.is_none() {
+            self.end.reach();
+        }
+        found
+    }
+
+    /// The program that runs.
+    pub(crate) fn running(&self) -> ProgramHash {
+        self.running
+    }
+
+    /// As [`Self::before`], where the same program has led there: no variable of another one is followed further.
+    pub(crate) fn scan_before(&self, place: usize) -> Option<usize> {
+        if self.is_taken_over_at(place) { None } else { self.before(place) }
+    }
+
+    /// Whether the scan of the step at `place` began in a state of another program, converted by an online change.
+    pub(crate) fn is_taken_over_at(&self, place: usize) -> bool {
+        self.sampled_at(place).is_some_and(|own| own.is_taken_over)
+    }
+
+    fn sampled_at(&self, place: usize) -> Option<&Sampled> {
+        self.steps.get(place).and_then(|step| step.sampled.as_ref())
+    }
+
     /// The place of the step that led to the state in which the step at `place` began.
     pub(crate) fn before(&self, place: usize) -> Option<usize> {
-        let own = self.steps.get(place).and_then(|step| step.sampled.as_ref());
+        let own = self.sampled_at(place);
         let found = own.and_then(|own| {
             (0..place).rev().find(|&earlier| {
                 self.steps[earlier]
@@ -191,8 +179,7 @@ impl History {
 
     /// Whether the scan of the step at `place` began in the initial state of the program.
     pub(crate) fn begins_at(&self, place: usize) -> bool {
-        let own = self.steps.get(place).and_then(|step| step.sampled.as_ref());
-        own.is_some_and(|own| self.initial.as_ref() == Some(&own.state))
+        self.sampled_at(place).is_some_and(|own| own.is_initial)
     }
 
     /// Whether somebody has looked for what is before the oldest state that is known.
@@ -254,7 +241,7 @@ impl History {
     pub(crate) fn holds(
         &mut self,
         moment: Moment,
-        (changed, lineage): (Option<ProgramHash>, Lineage),
+        (of, lineage): (Option<ProgramHash>, Lineage),
         state: &Image,
     ) {
         if self.referee.standing().is_some() {
@@ -262,10 +249,12 @@ impl History {
         }
         let place = self.unplaced.iter().position(|(_, it)| is_of(it, moment));
         let Some(place) = place else {
-            self.awaited = Some((moment, (changed, lineage), state.clone()));
+            self.awaited = Some((moment, (of, lineage), state.clone()));
             return;
         };
-        self.referee.goes_on_from((changed, lineage), state.clone());
+        // Which program a fault of this state is of is not known.
+        self.has_other_fault = of.is_some_and(|of| of != self.first);
+        self.referee.goes_on_from((of, lineage), state.clone());
         let later: Vec<(Time, Event)> = self.unplaced.drain(..).skip(place + 1).collect();
         self.awaited = None;
         for (at, event) in later {
@@ -288,30 +277,39 @@ impl History {
         if let Event::Sampled { moment, change: Some(_), .. } = event {
             self.replaced.get_or_insert(*moment);
         }
-        let Event::Sampled { moment, inputs, before, change: None, .. } = event else {
-            // The state before a change mark is one of another program than that which takes the sample.
+        let Event::Sampled { moment, inputs, before, change, .. } = event else {
             return (None, violation);
         };
         let truth = self.referee.truth().filter(|(of, _)| of == moment);
         let sampled = truth.and_then(|(_, outputs)| {
-            let state = self.referee.state_of(*before)?;
-            // Explanations are of the program that the cluster file has.
-            self.referee.is_of_first(*before).then_some(())?;
-            let after = before.after(inputs);
-            let fault = self.fault_after(after);
-            let was_stopped = self.fault_in(state).is_some();
+            let step = Taken { change: *change, inputs: inputs.clone() };
+            let (program, state) = self.referee.taken(*before, &step)?;
+            let after = before.after_step(&step);
+            let was_stopped = self.fault_in(&state).is_some();
             let is_reset = self.reset.is_some_and(|reset| inputs.get(reset));
-            Some(Sampled {
+            let is_taken_over = self.referee.program_of(*before) != Some(program);
+            let keeps_other = was_stopped && !is_reset && (self.has_other_fault || is_taken_over);
+            let fault = self.fault_after(after).filter(|_| !keeps_other);
+            let sampled = Sampled {
+                program,
+                is_taken_over,
+                is_initial: self.referee.is_initial(program, &state),
                 inputs: inputs.clone(),
                 before: *before,
-                state: state.clone(),
+                state,
                 after,
                 outputs: outputs.clone(),
                 fault,
                 fault_is_new: fault.is_some() && (is_reset || !was_stopped),
-            })
+            };
+            Some((sampled, keeps_other))
         });
-        (sampled, violation)
+        let Some((sampled, keeps_other)) = sampled else {
+            return (None, violation);
+        };
+        self.running = sampled.program;
+        self.has_other_fault = keeps_other;
+        (Some(sampled), violation)
     }
 
     /// The program fault that a state holds.
@@ -345,6 +343,13 @@ impl History {
         }
     }
 
+    /// Whatever its remote I/O reports: which program runs.
+    pub(crate) fn learn_running(&mut self, event: &Event) {
+        if let Event::ProgramChanged { to, .. } = event {
+            self.running = *to;
+        }
+    }
+
     /// A report of its remote I/O, of a cycle; the wrong thing that it is, if it is one.
     pub(crate) fn note(
         &mut self,
@@ -362,6 +367,7 @@ impl History {
             let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);
             sampled.take(*samples).for_each(|step| step.void = true);
         }
+        self.learn_running(event);
         self.order.note(event);
         self.by = member;
         let (sampled, violation) = self.sample(member, at, event);

@@ -26,6 +26,7 @@ mod history;
 mod listing;
 mod margin;
 mod model;
+mod online_change;
 mod overview;
 mod process_alarm;
 mod protection;
@@ -43,6 +44,7 @@ mod terminal;
 mod timeline;
 mod timing;
 mod value;
+mod version;
 mod why;
 mod zone;
 
@@ -58,6 +60,7 @@ pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, JournalText, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
 pub use model::{Bounds, Counters, MemberCounters, Model, ProgramCounters, SentTurn};
+pub use online_change::{ChangePlace, ChangeSnapshot, ChangingMember, ChangingProgram, GivenStep};
 pub use overview::{
     FollowedPlant, GroupOverview, GroupState, GroupView, PlantAlarm, PlantOverview, SpareOverview,
     SpareState,

@@ -20,13 +20,10 @@ mod standing;
 mod turns;
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use understudy_cluster::{Cluster, OnlineChanges};
-use understudy_interchange::DrawnUnit;
 use understudy_journal::{Cycles, Happening, Members, Record, TimeOfDay, TimesOfDay};
-use understudy_ladder::Observer;
-use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
 
 use crate::alarm::Alarms;
@@ -37,6 +34,7 @@ use crate::process_alarm::ProcessAlarms;
 use crate::series::Series;
 use crate::source::Trouble;
 use crate::timing::Timings;
+use crate::version::Versions;
 
 use changes::Changes;
 pub use counters::{Counters, MemberCounters, ProgramCounters};
@@ -111,10 +109,8 @@ pub struct Model {
     pub(crate) times: TimesOfDay,
     /// The time of day of the record that is taken, where the wall clock of its member is known.
     now: Option<TimeOfDay>,
-    observers: Vec<OnceLock<Option<Observer>>>,
-    interpreters: Vec<OnceLock<Option<Interpreter>>>,
-    /// The units of each program with numbers, as they are drawn.
-    pub(crate) drawings: Vec<OnceLock<Vec<DrawnUnit>>>,
+    /// By program.
+    versions: Vec<Versions>,
     /// The newest cycle of which the states of the stations are in the series.
     closed: Option<i64>,
     at_ns: u64,
@@ -160,9 +156,7 @@ impl Model {
             timings: Timings::new(schedule, bounds.timings),
             times: TimesOfDay::new(schedule.period()),
             now: None,
-            observers: vec![OnceLock::new(); programs],
-            interpreters: vec![OnceLock::new(); programs],
-            drawings: vec![OnceLock::new(); programs],
+            versions: cluster.controllers().iter().map(Versions::of).collect(),
             closed: None,
             at_ns: 0,
             records: 0,

@@ -104,13 +104,14 @@ impl Rehearsal {
         &self.found
     }
 
-    /// Takes the steps of the old program behind those that it has taken; a gap in them begins anew.
+    /// Takes the steps of the old program behind those that it has taken, and none of another one; a gap in them begins anew.
     pub fn take<'s>(&mut self, steps: impl Iterator<Item = &'s Step>) {
         for step in steps.filter(|step| !step.void) {
             if self.newest.is_some_and(|newest| step.cycle <= newest) {
                 continue;
             }
-            if let Some(sampled) = &step.sampled {
+            let is_of_old = |it: &&Sampled| it.program == self.change.before.hash;
+            if let Some(sampled) = step.sampled.as_ref().filter(is_of_old) {
                 self.newest = Some(step.cycle);
                 self.scan(step.cycle, sampled);
             }

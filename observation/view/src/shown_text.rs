@@ -62,7 +62,7 @@ impl Model {
         program: ProgramId,
         cycle: i64,
     ) -> Option<(Vec<ShownLine>, Option<ViewError>)> {
-        let code = &self.cluster.controllers().get(program.index())?.code;
+        let code = &self.controller_at(program, Some(cycle))?.code;
         let (typed, text) = (code.typed(), code.source_text()?);
         let source = SourceText::new(text);
         Some(match self.trace(program, cycle) {
@@ -71,9 +71,9 @@ impl Model {
         })
     }
 
-    /// The variables of a program with numbers, and the lines that use them.
+    /// The variables of a program with numbers, and the lines that use them, of the one that runs.
     pub fn uses(&self, program: ProgramId) -> Option<Vec<Uses>> {
-        let code = &self.cluster.controllers().get(program.index())?.code;
+        let code = &self.controller_at(program, None)?.code;
         let (typed, text) = (code.typed(), code.source_text()?);
         let source = SourceText::new(text);
         let uses = typed.variables.iter().map(|variable| {

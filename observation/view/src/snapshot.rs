@@ -13,6 +13,7 @@ use understudy_journal::{ClocksApart, TimeOfDay};
 use understudy_wire::Force;
 
 use crate::alarm::Alarm;
+use crate::online_change::ChangeSnapshot;
 use crate::process_alarm::ProcessAlarm;
 use crate::protection::{LostState, Protection};
 use crate::station::StationState;
@@ -89,6 +90,9 @@ pub struct Snapshot {
     /// Spares that have reported to a member, in the present cycle.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub spares: Vec<SpareSnapshot>,
+    /// The online change in progress.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub change: Option<ChangeSnapshot>,
     /// Late wake-ups of all members so far.
     pub host_stalls: u64,
     /// Alarms that last or are not acknowledged, without the shelved ones.

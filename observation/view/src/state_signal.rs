@@ -8,7 +8,7 @@ use serde_json::Value;
 use understudy_cluster::Controller;
 use understudy_ladder::{BlockKind, Element, Evaluation, Program as Ladder, Reading, visit};
 use understudy_typed::{Enumeration, Part, Program as TypedProgram};
-use understudy_wire::ProgramId;
+use understudy_wire::{ProgramHash, ProgramId};
 
 use crate::error::ViewError;
 use crate::history::History;
@@ -44,6 +44,8 @@ pub struct StateSignal {
     pub address: Option<String>,
     /// Its description.
     pub description: Option<String>,
+    /// Its program.
+    program: ProgramHash,
     place: Place,
 }
 
@@ -70,16 +72,14 @@ impl StateKind {
 }
 
 impl Model {
-    /// The signals in the state of a program; nothing where the cluster has no such program.
+    /// The signals in the state of the program that runs; nothing where the cluster has no such program.
     pub fn state_signals(&self, program: ProgramId) -> Vec<StateSignal> {
-        let controller = self.cluster.controllers().get(program.index());
-        controller.map_or_else(Vec::new, |controller| match controller.ladder() {
-            Some(ladder) => of_ladder(ladder),
-            None => of_typed(controller, controller.code.typed()),
-        })
+        let version = self.running_version(program);
+        version.map_or_else(Vec::new, |version| of_controller(version.controller()))
     }
 
-    /// The values of signals in the state of a program after the scan of a cycle.
+    /// The values of signals in the state of a program after the scan of a cycle; null where an online change had another program there, without a signal
+    /// of that name and type.
     ///
     /// # Errors
     /// Where the cycle or the state is not known.
@@ -100,15 +100,17 @@ impl Model {
         place: usize,
         signals: &[StateSignal],
     ) -> Result<Vec<Value>, ViewError> {
-        let controller = &self.cluster.controllers()[history.program().index()];
-        if controller.ladder().is_some() {
+        let version = self.version_at(history, place)?;
+        let values = |value: &dyn Fn(&StateSignal) -> Value| {
+            let own = signals.iter().map(|signal| version.signal(signal));
+            own.map(|own| own.map_or(Value::Null, value)).collect()
+        };
+        if version.controller().ladder().is_some() {
             let evaluation = self.evaluation_at(history, place)?;
-            let values = signals.iter();
-            return Ok(values.map(|signal| signal.in_scan(&evaluation)).collect());
+            return Ok(values(&|signal| signal.in_scan(&evaluation)));
         }
         let state = self.state_after(history, place)?;
-        let values = signals.iter();
-        Ok(values.map(|signal| signal.in_state(&state)).collect())
+        Ok(values(&|signal| signal.in_state(&state)))
     }
 
     /// The values of signals in the state of a program after each scan from one cycle to another, as far as they are known; the newest
@@ -143,26 +145,31 @@ impl Model {
         values
     }
 
-    /// The newest cycle of a program after which its whole state is known, and that state as stations hold it.
+    /// The newest cycle of a program after which its whole state is known, and that state as stations hold it; `hash` is that of the program whose state
+    /// is wanted.
     ///
     /// # Errors
-    /// Where no cycle of the program has one.
-    pub fn newest_state(&self, program: ProgramId) -> Result<(i64, Vec<u64>), ViewError> {
+    /// Where no cycle of the program has one, and where the run has another program there.
+    pub fn newest_state(
+        &self,
+        program: ProgramId,
+        hash: ProgramHash,
+    ) -> Result<(i64, Vec<u64>), ViewError> {
         let history = self.history_of(program)?;
-        let code = &self.cluster.controllers()[program.index()].code;
         let steps = history.steps().iter().rev().filter(|step| !step.void);
         let mut sampled = steps.filter_map(|step| Some((step.cycle, step.sampled.as_ref()?)));
         let (cycle, sampled) = sampled.next().ok_or_else(|| self.no_cycle(program, 0))?;
-        let state = code.after_scan(sampled.state.words(), sampled.inputs.words());
-        Ok((cycle, state))
+        let controller = self.controller_at(program, Some(cycle));
+        let controller = controller.filter(|controller| controller.hash == hash);
+        let code = &controller.ok_or_else(|| self.other_program(program, cycle))?.code;
+        Ok((cycle, code.after_scan(sampled.state.words(), sampled.inputs.words())))
     }
 
     /// x(t+1) of a program with numbers.
     fn state_after(&self, history: &History, place: usize) -> Result<Vec<u64>, ViewError> {
         let sampled = self.sampled_at(history, place)?;
         let interpreter = self.interpreter_of(history, place)?;
-        let controller = &self.cluster.controllers()[history.program().index()];
-        let mut outputs = vec![0; controller.interface.outputs.width().div_ceil(64)];
+        let mut outputs = vec![0; sampled.outputs.words().len()];
         let mut state = sampled.state.words().to_vec();
         state.resize(interpreter.state_words(), 0);
         interpreter.step(&mut state, sampled.inputs.words(), &mut outputs);
@@ -171,6 +178,11 @@ impl Model {
 }
 
 impl StateSignal {
+    /// The program whose state has it.
+    pub(crate) fn program(&self) -> ProgramHash {
+        self.program
+    }
+
     /// Its names of values, where it is of an enumeration.
     pub fn values(&self) -> Option<&Enumeration> {
         match &self.place {
@@ -215,7 +227,15 @@ impl StateSignal {
     }
 }
 
-fn of_ladder(ladder: &Ladder) -> Vec<StateSignal> {
+/// The signals in the state of the program of a controller.
+pub(crate) fn of_controller(controller: &Controller) -> Vec<StateSignal> {
+    match controller.ladder() {
+        Some(ladder) => of_ladder(controller, ladder),
+        None => of_typed(controller, controller.code.typed()),
+    }
+}
+
+fn of_ladder(controller: &Controller, ladder: &Ladder) -> Vec<StateSignal> {
     let memory = ladder.memory.iter().enumerate();
     let mut signals: Vec<StateSignal> = memory
         .map(|(number, signal)| StateSignal {
@@ -224,6 +244,7 @@ fn of_ladder(ladder: &Ladder) -> Vec<StateSignal> {
             of: "BOOL".to_owned(),
             address: signal.address.as_ref().map(ToString::to_string),
             description: signal.description.clone(),
+            program: controller.hash,
             place: Place::Memory(number),
         })
         .collect();
@@ -239,6 +260,7 @@ fn of_ladder(ladder: &Ladder) -> Vec<StateSignal> {
                     of: of.to_owned(),
                     address: None,
                     description: Some(format!("{} in rung {}", block.kind.word(), number + 1)),
+                    program: controller.hash,
                     place: Place::Block(number, element),
                 });
             }
@@ -288,6 +310,7 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
                     of: declared.to_string(),
                     address: variable.address.clone().filter(|_| is_whole),
                     description: variable.description.clone().filter(|_| is_whole),
+                    program: controller.hash,
                     place: Place::Part(part),
                 });
             }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use understudy_cluster::Cluster;
-use understudy_journal::{Happening, Record};
+use understudy_cluster::{Cluster, OnlineChanges};
+use understudy_journal::{Happening, Record, RunEvent};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_typed::Fault;
 use understudy_wire::{ProgramId, Time};
@@ -67,6 +67,7 @@ impl Stop {
 #[derive(Debug, Clone)]
 pub(crate) struct Stops {
     cluster: Arc<Cluster>,
+    changes: OnlineChanges,
     /// Of the programs with numbers.
     programs: Vec<(History, Stop)>,
 }
@@ -77,12 +78,13 @@ const CYCLES: usize = 2;
 impl Stops {
     pub(crate) fn new(cluster: &Cluster) -> Self {
         let cluster = Arc::new(cluster.clone());
-        Self { programs: Self::begun(&cluster), cluster }
+        let changes = OnlineChanges::of(Arc::clone(&cluster));
+        Self { programs: Self::begun(&cluster), changes, cluster }
     }
 
     /// The same before the first record.
     pub(crate) fn again(&self) -> Self {
-        Self { programs: Self::begun(&self.cluster), cluster: Arc::clone(&self.cluster) }
+        Self::new(&self.cluster)
     }
 
     fn begun(cluster: &Cluster) -> Vec<(History, Stop)> {
@@ -94,8 +96,14 @@ impl Stops {
 
     /// Takes the next record; the program fault that it shows, in words.
     pub(crate) fn take(&mut self, record: &Record) -> Option<String> {
-        let Happening::RemoteIo(event) = &record.event else {
-            return None;
+        let event = match &record.event {
+            Happening::RemoteIo(event) => event,
+            Happening::Run(RunEvent::ChangeLoaded { texts }) => {
+                let change = Arc::new(self.changes.load(texts)?);
+                self.programs.iter_mut().for_each(|(history, _)| history.learn(&change));
+                return None;
+            }
+            _ => return None,
         };
         let member = record.member?;
         let program = member.sampled_program()?;
@@ -115,8 +123,8 @@ impl Stops {
                 let newest = newest.and_then(|step| step.sampled.as_ref());
                 match stop.decided(*missing, newest)? {
                     Change::Stopped(fault) => {
-                        let fault = fault.as_ref();
-                        Some(program_fault_text(&self.cluster, program, fault))
+                        let controller = self.changes.controller(program, history.running());
+                        Some(program_fault_text(controller, fault.as_ref()))
                     }
                     Change::Running => None,
                 }

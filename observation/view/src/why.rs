@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
+use understudy_cluster::Controller;
 use understudy_journal::source_word;
 use understudy_journal::{TimeOfDay, TimesOfDay};
 use understudy_ladder::Program;
@@ -189,7 +190,7 @@ impl Model {
     /// # Errors
     /// Where there is no such signal, or nothing is known of the cycle.
     pub fn why(&self, signal: &str, cycle: Option<i64>) -> Result<Why, ViewError> {
-        let (program, name) = self.find_signal(signal)?;
+        let (program, name) = self.find_signal(signal, cycle)?;
         let history = self.history_of(program)?;
         let place = match cycle {
             Some(cycle) => history.place_of(cycle),
@@ -220,7 +221,8 @@ impl Model {
         place: usize,
     ) -> Result<Why, ViewError> {
         let step = &history.steps()[place];
-        let controller = &self.cluster.controllers()[program.index()];
+        let version = self.version_at(history, place)?;
+        let controller = version.controller();
         let output = controller.interface.outputs.find(name);
         let decided = step.driven.as_ref().filter(|_| output.is_some());
         let source = decided.map(|driven| driven.source);
@@ -245,18 +247,23 @@ impl Model {
         let unforced = drives.and_then(|driven| Some(value_in(output?, &driven.unforced)));
         let typed = controller.code.typed();
         let text = controller.code.source_text();
-        let because = match (controller.ladder(), text) {
+        // What is held may have been proved by another program, before an online change.
+        let stopped = missing == Some(Missing::ProgramFault);
+        let failed = if stopped { history.fault_before(place) } else { None };
+        let explained_by = self.version_at(history, failed.or(explained).unwrap_or(place))?;
+        let explained_by = explained_by.controller();
+        let code = &explained_by.code;
+        let because = match (explained_by.ladder(), code.source_text()) {
             (Some(ladder), _) => explained
                 .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
                 .transpose()?,
             (None, None) => None,
             (None, Some(text)) => {
+                let typed = code.typed();
                 let mut explainer = statements::Explainer::new(self, history, typed, text);
-                let stopped = missing == Some(Missing::ProgramFault);
                 let value = unforced.clone().unwrap_or_default();
-                let fault = stopped.then(|| explainer.fault(name, value, place)).flatten();
-                match (fault, explained, typed.part(name)) {
-                    (Some(fault), ..) => Some(fault),
+                match (failed, explained, typed.part(name)) {
+                    (Some(_), ..) => explainer.fault(name, value, place),
                     (None, Some(explained), Some(part)) => Some(explainer.root(&part, explained)?),
                     _ => None,
                 }
@@ -320,9 +327,15 @@ impl Model {
         })
     }
 
-    /// The program and the name of an output or a memory bit.
-    fn find_signal(&self, asked: &str) -> Result<(ProgramId, String), ViewError> {
-        let controllers = self.cluster.controllers();
+    /// The program and the name of an output or a memory bit, as in a cycle or in the newest one.
+    fn find_signal(
+        &self,
+        asked: &str,
+        cycle: Option<i64>,
+    ) -> Result<(ProgramId, String), ViewError> {
+        let programs = (0..self.cluster.controllers().len() as u8).map(ProgramId);
+        let controllers = programs.filter_map(|program| self.controller_at(program, cycle));
+        let controllers: Vec<&Controller> = controllers.collect();
         let mut found = Vec::new();
         let mut known = Vec::new();
         for (place, controller) in controllers.iter().enumerate() {
@@ -425,6 +438,18 @@ impl Model {
             sum: sum.to_string(),
             not_received: not_received.collect(),
         })
+    }
+}
+
+/// Why there is nothing before the step at `place` that a program is explained with.
+fn end_of_history(history: &History, place: usize) -> String {
+    if history.is_taken_over_at(place) {
+        let cycle = history.steps()[place].cycle;
+        format!("unchanged since the online change of cycle {cycle}")
+    } else if history.begins_at(place) {
+        "its initial value".to_owned()
+    } else {
+        "unchanged since before the oldest cycle that is remembered".to_owned()
     }
 }
 

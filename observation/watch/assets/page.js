@@ -95,6 +95,21 @@ function scenarioOver(state, run) {
   setText(place, `The scenario is over (${state.scenario_over}).${invitation}`);
 }
 
+// An online change in progress. A program that is replaced by another one has other variables, and other lines or rungs.
+let hashes = "";
+
+function online({ change, programs }, live) {
+  const place = document.getElementById("online-change");
+  place.hidden = !change;
+  setText(place, change ? `Online change: ${change}` : "");
+  const running = programs.map((program) => program.hash).join(" ");
+  if (live && hashes && running !== hashes) {
+    signals.forget();
+    VIEWS[current].enter?.();
+  }
+  hashes = live ? running : hashes;
+}
+
 // Stale values are greyed out, with the reason.
 function showStale() {
   const why = time.stale();
@@ -146,6 +161,7 @@ async function begin() {
     head(state, live);
     showPast(state);
     scenarioOver(state, run);
+    online(state, live);
     VIEWS[current].show(state, live);
     why.show();
     showStale();

@@ -37,6 +37,12 @@ export function load() {
   return loading;
 }
 
+// The programs that run have other variables.
+export function forget() {
+  all = all.filter((signal) => signal.kind === "input" || signal.kind === "output");
+  loading = null;
+}
+
 export const find = (id) => byId.get(id);
 
 export const fullName = (signal) => `${programs[signal.program]}.${signal.name}`;

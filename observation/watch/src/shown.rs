@@ -13,7 +13,7 @@ use understudy_journal::{ClocksApart, TimeOfDay};
 use understudy_remote_io::SignalInput;
 use understudy_typed::{Point, Points};
 use understudy_view::{
-    Alarm, LostState, Model as RunModel, ProcessAlarm, ProgramSnapshot, Protection,
+    Alarm, ChangeSnapshot, LostState, Model as RunModel, ProcessAlarm, ProgramSnapshot, Protection,
     RemoteIoSnapshot, Snapshot, forced_point, forced_value, value_of,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
@@ -44,6 +44,8 @@ pub(crate) struct State {
     past: Option<Past>,
     /// What the scenario came to, where it is over and the cluster stays up.
     scenario_over: Option<String>,
+    /// The online change in progress, in words.
+    change: Option<String>,
     cycle_master: Option<String>,
     members: Vec<ShownMember>,
     programs: Vec<ShownProgram>,
@@ -70,6 +72,8 @@ struct Past {
 struct ShownProgram {
     index: usize,
     name: String,
+    /// Hash of the program that runs: with another one, its text and its variables are others.
+    hash: Option<String>,
     source: &'static str,
     /// The station whose parity word the outputs were reconstructed from.
     word_of: Option<String>,
@@ -260,6 +264,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         event_count: snapshot.events,
         cycle_master: snapshot.cycle_master,
         scenario_over: snapshot.scenario_over,
+        change: snapshot.change.as_ref().map(ChangeSnapshot::text),
     })
 }
 
@@ -288,6 +293,9 @@ fn shown_program(
     ShownProgram {
         index,
         name: program.program.clone(),
+        hash: run
+            .controller_at(ProgramId(index as u8), snapshot.cycle)
+            .map(|controller| controller.hash.to_string()),
         source: program.source.unwrap_or("unknown"),
         word_of: program.word_of.clone(),
         missing: program.missing,

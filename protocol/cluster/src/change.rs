@@ -22,35 +22,70 @@ pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_p
 pub use self::settings::ChangedSetting;
 use self::settings::changed_settings;
 pub use self::unfit::{PairReason, Unfit};
-use crate::cluster::Cluster;
+use crate::cluster::{Cluster, Controller};
 use crate::code::Code;
 use crate::configuration::{fallback_text, filled};
 use crate::source_text::read_kept;
 
-/// The online changes of one run, one after another: each is loaded by what the ones before it have led to.
+/// The configurations of one run: that with which it began, and those that online changes were to lead to.
 #[derive(Debug, Clone)]
 pub struct OnlineChanges {
-    cluster: Arc<Cluster>,
-    last: Option<ChangeTexts>,
+    /// That with which it began, and the others in the order in which a change began or ended there last.
+    clusters: Vec<Arc<Cluster>>,
 }
+
+/// Configurations of one run that are known, at most.
+const MOST_CONFIGURATIONS: usize = 32;
 
 impl OnlineChanges {
     /// Of a run that begins with this cluster.
     pub fn of(cluster: Arc<Cluster>) -> Self {
-        Self { cluster, last: None }
+        Self { clusters: vec![cluster] }
     }
 
-    /// The next change; none where its texts are not of this cluster, and so were refused by its members.
+    /// The next change; none where its texts are of no configuration that is known, and so were refused by its members.
     pub fn load(&mut self, texts: &ChangeTexts) -> Option<OnlineChange> {
-        if let Some(last) = self.last.take()
-            && last.after == texts.before
-            && let Ok(changed) = self.cluster.changed(&last, last.after)
-        {
-            self.cluster = Arc::new(changed);
+        let place = self.clusters.iter().rposition(|it| texts.name().has(configuration(it)))?;
+        let known = Arc::clone(&self.clusters[place]);
+        let change = texts.load(&known).ok()?;
+        let other = match configuration(&known) == texts.before {
+            true => texts.after,
+            false => texts.before,
+        };
+        let changed = self.clusters.iter().find(|it| configuration(it) == other).cloned();
+        let changed = match changed {
+            Some(changed) => changed,
+            None => Arc::new(known.changed(texts, other).ok()?),
+        };
+        for used in [known, changed] {
+            self.use_again(used);
         }
-        self.last = Some(texts.clone());
-        texts.load(&self.cluster).ok()
+        Some(change)
     }
+
+    fn use_again(&mut self, used: Arc<Cluster>) {
+        let first = configuration(&self.clusters[0]);
+        let own = configuration(&used);
+        if own == first {
+            return;
+        }
+        self.clusters.retain(|it| configuration(it) != own);
+        self.clusters.push(used);
+        if self.clusters.len() > MOST_CONFIGURATIONS {
+            self.clusters.remove(1);
+        }
+    }
+
+    /// The controller of a program where that is the one with this hash.
+    pub fn controller(&self, program: ProgramId, hash: ProgramHash) -> Option<&Controller> {
+        let controllers =
+            self.clusters.iter().filter_map(|it| it.controllers().get(program.index()));
+        controllers.rev().find(|controller| controller.hash == hash)
+    }
+}
+
+fn configuration(cluster: &Cluster) -> ConfigurationHash {
+    cluster.agreement().configuration
 }
 
 /// What every member is given to prepare an online change: the programs and the settings of remote I/Os that change, before and after.
@@ -191,6 +226,11 @@ impl ChangeTexts {
         programs.chain(self.fallbacks.iter().map(|changed| changed.program)).collect()
     }
 
+    /// The programs before and after, as records of members keep them.
+    pub fn kept_programs(&self) -> impl Iterator<Item = RetainedProgram> {
+        self.programs.iter().flat_map(|changed| [changed.before.kept(), changed.after.kept()])
+    }
+
     /// The change back.
     #[must_use]
     pub fn back(self) -> Self {
@@ -315,6 +355,8 @@ impl Cluster {
             is_changed |= controller.hash != text.hash;
             controller.hash = text.hash;
             programs[place] = Program { hash: text.hash, executable: code.executable() };
+            // The same points, which have their values at other places of its memory.
+            controller.interface = code.interface();
             controller.code = code;
         }
         for changed in &texts.fallbacks {

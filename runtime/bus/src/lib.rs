@@ -83,7 +83,9 @@ pub use orders::{Control, Cuts, Order, Orders, orders};
 pub use ports::free_addresses;
 pub use refused_as::RefusedAs;
 pub use refused_orders::{RefusedOrder, RefusedOrders};
-pub use retained::{CarriedOver, FoundFile, FoundNotes, Owner, RetainedFiles, Retention};
+pub use retained::{
+    CarriedOver, FoundFile, FoundNotes, LoadedPrograms, Owner, RetainedFiles, Retention,
+};
 pub use rights::{Rights, keep_times};
 pub use wakefulness::Wakefulness;
 pub use watchdog::Watchdog;

@@ -19,17 +19,19 @@ use understudy_wire::{
     RetainedRun,
 };
 
+pub use program::LoadedPrograms;
 pub(crate) use writing::Retainer;
 
 /// Bytes of a file that are read, at most: a state, and the steps of an hour.
 const MAXIMUM_FILE_BYTES: u64 = 64 << 20;
 
 /// Two files that are written in turn, and the text of the program next to them.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct RetainedFiles {
     folder: PathBuf,
     name: String,
     program: Option<RetainedProgram>,
+    loaded: LoadedPrograms,
     authority: Option<AuthorityHash>,
 }
 
@@ -80,7 +82,8 @@ pub struct Retention {
 impl RetainedFiles {
     /// Those of `name` in `folder`: a remote I/O, or a station and a program of it.
     pub fn new(folder: &Path, name: String) -> Self {
-        Self { folder: folder.to_owned(), name, program: None, authority: None }
+        let loaded = LoadedPrograms::default();
+        Self { folder: folder.to_owned(), name, program: None, loaded, authority: None }
     }
 
     /// Begins each file with the authority of the keys of this member.
@@ -93,6 +96,12 @@ impl RetainedFiles {
     #[must_use]
     pub fn with_program(self, program: RetainedProgram) -> Self {
         Self { program: Some(program), ..self }
+    }
+
+    /// Keeps the texts of the programs of online changes too, once a record is of one of them.
+    #[must_use]
+    pub fn with_loaded(self, loaded: LoadedPrograms) -> Self {
+        Self { loaded, ..self }
     }
 
     fn paths(&self) -> [PathBuf; 2] {

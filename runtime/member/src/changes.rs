@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use understudy_bus::{ChangeKeeper, Changes, FoundFile};
+use understudy_bus::{ChangeKeeper, Changes, FoundFile, LoadedPrograms};
 use understudy_cluster::{ChangeError, ChangeTexts, Cluster};
 use understudy_cycle::OnlineChange;
 use understudy_wire::{
@@ -41,6 +41,8 @@ pub(crate) struct StartedChange {
     pub(crate) changes: Changes,
     /// The file, where it says nothing that can be used.
     pub(crate) found: Option<FoundFile>,
+    /// What records of this member may be of, besides the programs of the cluster.
+    pub(crate) programs: LoadedPrograms,
 }
 
 /// What a member has kept of online changes, and what takes the next one; `cluster` is that of its file.
@@ -49,11 +51,13 @@ pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> Star
         .retain
         .as_ref()
         .map(|folder| folder.join(format!("{}.{}.change", cluster.name(), options.name)));
+    let programs = LoadedPrograms::default();
     let mut keeper = Keeper {
         cluster: cluster.clone(),
         kept: KeptChanges::default(),
         loaded: None,
         file: file.clone(),
+        programs: programs.clone(),
     };
     let restored = file.as_ref().map_or(Ok(None), |file| keeper.start(file));
     let (restored, problem) = match restored {
@@ -68,7 +72,7 @@ pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> Star
     let change = restored.as_ref().map(|(change, _)| Arc::clone(change));
     let cluster = keeper.cluster.clone();
     let changes = Changes::new(configurations, change, text, Some(Box::new(keeper)));
-    StartedChange { cluster, restored, changes, found }
+    StartedChange { cluster, restored, changes, found, programs }
 }
 
 impl StartedChange {
@@ -87,6 +91,7 @@ struct Keeper {
     loaded: Option<ChangeTexts>,
     /// Nothing where the member keeps nothing.
     file: Option<PathBuf>,
+    programs: LoadedPrograms,
 }
 
 impl Keeper {
@@ -134,7 +139,15 @@ impl Keeper {
             }
         };
         (self.cluster, self.kept) = (cluster, kept);
+        self.tell_programs();
         Ok(restored)
+    }
+
+    /// Records may be of the programs of the change that goes on, of one that was loaded, and of the cluster.
+    fn tell_programs(&self) {
+        let current = self.kept.current.as_ref().map(|(texts, _)| texts);
+        let texts = current.into_iter().chain(&self.loaded);
+        self.programs.are(texts.flat_map(ChangeTexts::kept_programs).collect());
     }
 
     /// The canonical text of a configuration that is loaded.
@@ -177,6 +190,7 @@ impl ChangeKeeper for Keeper {
         }
         let change = texts.load(&self.cluster).map_err(|error| format!("U0631: {error}"))?;
         self.loaded = Some(texts);
+        self.tell_programs();
         Ok(Arc::new(change))
     }
 
@@ -257,7 +271,9 @@ mod tests {
     /// A member that starts with this cluster file: its configurations, and what takes changes.
     fn start(file: &Path, cluster: &Cluster) -> (Result<Configurations, String>, Keeper) {
         let (cluster, kept) = (cluster.clone(), KeptChanges::default());
-        let mut keeper = Keeper { cluster, kept, loaded: None, file: Some(file.to_owned()) };
+        let programs = LoadedPrograms::default();
+        let file_of = Some(file.to_owned());
+        let mut keeper = Keeper { cluster, kept, loaded: None, file: file_of, programs };
         let restored = keeper.start(file);
         let own = hash(&keeper.cluster);
         let none = Configurations { own, prepared: None };

@@ -185,7 +185,10 @@ where
     let endpoints = Endpoints::new(cluster.agreement().cluster, member, peers, cluster.roster());
     let endpoints = endpoints.map_err(MemberError::Endpoints)?;
     let endpoints = endpoints.with_multicast(options.multicast);
-    let StartedChange { changes, found, .. } = started;
+    let StartedChange { changes, found, programs, .. } = started;
+    for (_, files) in &mut retention.files {
+        *files = files.clone().with_loaded(programs.clone());
+    }
     retention.found.extend(found);
     let keys = read_keys(options, cluster, member, changes.clone())?;
     let settings = MemberSettings {

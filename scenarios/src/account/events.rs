@@ -39,9 +39,9 @@ impl Account {
                     trace.push(at, &sum);
                 }
             }
-            StationEvent::Holds { moment, program, changed, lineage, state } => {
+            StationEvent::Holds { moment, program, of, lineage, state } => {
                 if let Some(referee) = self.terms.referees.get_mut(program.index()) {
-                    referee.holds(*moment, (*changed, *lineage), state);
+                    referee.holds(*moment, (*of, *lineage), state);
                 }
             }
             StationEvent::Refused { member, theirs, ours } => {

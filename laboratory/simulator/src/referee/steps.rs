@@ -38,27 +38,32 @@ impl Referee {
         let Some(place) = self.newest else {
             return;
         };
-        let State { lineage, program: before, mut bits, .. } = self.states[place].clone();
-        let hash = step.change.unwrap_or(before);
-        let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
-        let program = versions.of(hash);
-        let Some(program) = program else {
+        let lineage = self.states[place].lineage;
+        let Some((hash, mut bits)) = self.taken_from(place, step) else {
             // A program that is not known here: nothing after it is judged.
             self.gaps += 1;
             return self.misses_records();
         };
-        if hash != before {
-            let converted = versions.convert((before, hash), bits.words(), step.inputs.words());
-            let converted = converted
-                .and_then(|words| Image::from_words(program.executable.state_count(), &words).ok());
-            let Some(converted) = converted else {
-                return self.misses_records();
-            };
-            bits = converted;
-        }
+        let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
+        let Some(program) = versions.of(hash) else {
+            return;
+        };
         let outputs = scan(&program.executable, &mut self.scratch, &mut bits, &step.inputs);
         self.remember(moment, (hash, lineage.after_step(step)), bits);
         self.truth = Some((moment, outputs));
+    }
+
+    /// The program that takes a step from the state at a place, and its state before the step; none where a change leads to a program that is not known.
+    pub(super) fn taken_from(&self, place: usize, step: &Step) -> Option<(ProgramHash, Image)> {
+        let State { program: before, bits, .. } = &self.states[place];
+        let hash = step.change.unwrap_or(*before);
+        let program = self.versions().of(hash)?;
+        if hash == *before {
+            return Some((hash, bits.clone()));
+        }
+        let inputs = step.inputs.words();
+        let converted = self.versions().convert((*before, hash), bits.words(), inputs)?;
+        Some((hash, Image::from_words(program.executable.state_count(), &converted).ok()?))
     }
 }
 

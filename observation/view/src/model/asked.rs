@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use understudy_cluster::Cluster;
+use understudy_cluster::{Cluster, Controller};
 use understudy_journal::{Members, SourceCounts, TimeOfDay};
-use understudy_ladder::{Evaluation, Observer};
+use understudy_ladder::Evaluation;
 use understudy_typed::{Interpreter, Trace};
 use understudy_wire::{Member, Moment, ProgramId, StationId};
 
@@ -16,6 +16,11 @@ use crate::history::{History, Sampled};
 use crate::series::Series;
 use crate::station::StationState;
 use crate::timing::CycleTiming;
+use crate::version::Version;
+
+/// Why a scan after an online change is not explained.
+const NOT_KNOWN: &str =
+    "an online change has replaced its program, and the journal does not contain the new one";
 
 impl Model {
     /// The cluster of the run.
@@ -160,15 +165,12 @@ impl Model {
         history: &History,
         place: usize,
     ) -> Result<Evaluation, ViewError> {
-        let program = history.program();
         let sampled = self.sampled_at(history, place)?;
-        let controller = &self.cluster.controllers()[program.index()];
         let period = self.cluster.agreement().schedule.period();
-        let observer = self.observers[program.index()]
-            .get_or_init(|| Observer::new(controller.ladder()?, period).ok());
-        let observer = observer.as_ref().ok_or_else(|| ViewError::NoState {
+        let version = self.version_at(history, place)?;
+        let observer = version.observer(period).ok_or_else(|| ViewError::NoState {
             cycle: history.steps()[place].cycle,
-            program: self.program_name(program).to_owned(),
+            program: self.program_name(history.program()).to_owned(),
             reason: "only a ladder has a power flow".to_owned(),
         })?;
         Ok(observer.evaluate(sampled.state.words(), sampled.inputs.words()))
@@ -196,16 +198,48 @@ impl Model {
         history: &History,
         place: usize,
     ) -> Result<&Interpreter, ViewError> {
-        let program = history.program();
-        let interpreter = self.interpreters[program.index()].get_or_init(|| {
-            let code = &self.cluster.controllers()[program.index()].code;
-            code.source_text().map(|_| Interpreter::new(code.typed()))
-        });
-        interpreter.as_ref().ok_or_else(|| ViewError::NoState {
+        let interpreter = self.version_at(history, place)?.interpreter();
+        interpreter.ok_or_else(|| ViewError::NoState {
             cycle: history.steps()[place].cycle,
-            program: self.program_name(program).to_owned(),
+            program: self.program_name(history.program()).to_owned(),
             reason: "only a program with numbers has statements".to_owned(),
         })
+    }
+
+    /// The program that took the sample of a step, or that before it where it has none.
+    pub(crate) fn version_at(
+        &self,
+        history: &History,
+        place: usize,
+    ) -> Result<&Version, ViewError> {
+        let program = history.program();
+        let hash = history.program_at(place);
+        let version = self.versions.get(program.index()).and_then(|it| it.find(hash));
+        version.ok_or_else(|| ViewError::NoState {
+            cycle: history.steps()[place].cycle,
+            program: self.program_name(program).to_owned(),
+            reason: NOT_KNOWN.to_owned(),
+        })
+    }
+
+    /// The program that runs, or that with which the run began where that one is not known.
+    pub(crate) fn running_version(&self, program: ProgramId) -> Option<&Version> {
+        let versions = self.versions.get(program.index())?;
+        let running = self.history(program).map(History::running);
+        Some(running.and_then(|it| versions.find(it)).unwrap_or_else(|| versions.first()))
+    }
+
+    /// The program that took the sample of a cycle; where nothing is known of the cycle, the one that runs.
+    pub(crate) fn version_in(&self, program: ProgramId, cycle: Option<i64>) -> Option<&Version> {
+        let history = self.history(program)?;
+        let place = cycle.and_then(|cycle| history.place_of(cycle));
+        let version = place.and_then(|place| self.version_at(history, place).ok());
+        version.or_else(|| self.running_version(program))
+    }
+
+    /// The controller with the program that took the sample of a cycle; where nothing is known of the cycle, with the one that runs.
+    pub fn controller_at(&self, program: ProgramId, cycle: Option<i64>) -> Option<&Controller> {
+        self.version_in(program, cycle).map(Version::controller)
     }
 
     /// The sample of a step, where the state before it is known.
@@ -219,9 +253,7 @@ impl Model {
             let missing = step.driven.as_ref().and_then(|driven| driven.missing);
             let reason = match missing {
                 Some(missing) => crate::describe::missing_text(missing),
-                None if history.is_replaced(step.moment) => {
-                    "an online change has replaced its program, and a view explains the program with which the run began"
-                }
+                None if history.is_replaced(step.moment) => NOT_KNOWN,
                 None => "the journal does not contain the start of its history",
             };
             ViewError::NoState {
@@ -230,6 +262,15 @@ impl Model {
                 reason: reason.to_owned(),
             }
         })
+    }
+
+    /// The run has another program in the place of one after a cycle than the one that is asked for.
+    pub(crate) fn other_program(&self, program: ProgramId, cycle: i64) -> ViewError {
+        ViewError::NoState {
+            cycle,
+            program: self.program_name(program).to_owned(),
+            reason: "the run has another program there, after an online change".to_owned(),
+        }
     }
 
     pub(crate) fn history_of(&self, program: ProgramId) -> Result<&History, ViewError> {

@@ -10,6 +10,7 @@ use understudy_wire::{ConfigurationHash, Member, ProgramId, ProgramSet, StationI
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
 use crate::describe::odd_configuration_text;
+use crate::online_change::ChangeReport;
 
 /// A member that drops the frames of another one, since their configurations differ.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,9 +43,9 @@ impl Model {
                 self.check_words(*moment);
                 return;
             }
-            StationEvent::Holds { moment, program, changed, lineage, state } => {
+            StationEvent::Holds { moment, program, of, lineage, state } => {
                 if let Some(history) = self.histories.get_mut(program.index()) {
-                    history.holds(*moment, (*changed, *lineage), state);
+                    history.holds(*moment, (*of, *lineage), state);
                 }
                 return;
             }
@@ -71,6 +72,10 @@ impl Model {
                 own(StationChange::Adopted(*program))
             }
             StationEvent::BecameCycleMaster { .. } => Some(Change::BecameCycleMaster(station)),
+            StationEvent::Configured(configurations) => {
+                let own = Member::Station(station);
+                Some(Change::Online(ChangeReport::Configured(own, *configurations)))
+            }
             StationEvent::Excluded { program, .. } => {
                 let excluded = ProgramChange::Excluded(StationSet::only(station));
                 Some(Change::Program(*program, excluded))

@@ -15,7 +15,9 @@ use crate::describe::{
     source_text,
 };
 use crate::event::{Event, Level};
+use crate::online_change::ChangeReport;
 use crate::stop::{self, Stop};
+use crate::version::Version;
 
 /// The alarm of forced signals.
 const FORCED: &str = "forced";
@@ -91,9 +93,10 @@ impl Model {
             }
             _ => self.cycles.of(moment(&record.event)),
         };
-        if !self.cycles.is_fixed()
-            && let Some(violation) =
-                self.histories[place].note(cycle, member, Time(record.at_ns), event)
+        if self.cycles.is_fixed() {
+            self.histories[place].learn_running(event);
+        } else if let Some(violation) =
+            self.histories[place].note(cycle, member, Time(record.at_ns), event)
         {
             self.violated(record, cycle, &violation.to_string());
         }
@@ -172,9 +175,10 @@ impl Model {
                 None
             }
             // The engineer has moved the change on.
-            RemoteIoEvent::Configured(_) => {
+            RemoteIoEvent::Configured(configurations) => {
                 self.alarms.all_over(&record.name, &[CHANGE_TAKEN_BACK], cycle);
-                None
+                let by = record.member.unwrap_or(Member::RemoteIo(program));
+                Some(Change::Online(ChangeReport::Configured(by, *configurations)))
             }
             RemoteIoEvent::AdoptedLineage { .. } | RemoteIoEvent::StateRecovered { .. } => {
                 self.alarms.all_over(&record.name, &QUESTIONS, cycle);
@@ -310,7 +314,8 @@ impl Model {
         let subject = (record.name.clone(), PROGRAM_FAULT);
         self.alarms.over(&subject, cycle);
         if let stop::Change::Stopped(fault) = change {
-            let text = program_fault_text(&self.cluster, program, fault.as_ref());
+            let version = self.running_version(program);
+            let text = program_fault_text(version.map(Version::controller), fault.as_ref());
             let is_first = self.programs[program.index()].source.is_none();
             if self.read_from.is_some() && is_first {
                 // It is not known when it occurred.

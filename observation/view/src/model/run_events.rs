@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use understudy_cycle::OnlineChange;
 use understudy_journal::{Action, Command, Process, Record, RunEvent};
 use understudy_wire::Member;
 
@@ -9,6 +10,7 @@ use super::Model;
 use super::standing::{Change, StationChange};
 use crate::alarm::UNPROTECTED;
 use crate::describe::fault_text;
+use crate::online_change::{ChangeReport, LoadedChange};
 
 /// The alarm of a simulated plant that has ended.
 const ENDED: &str = "ended";
@@ -86,8 +88,20 @@ impl Model {
                     history.asked(write);
                 }
             }
+            RunEvent::Commanded {
+                command: Command::Change { request },
+                owner,
+                refused: None,
+                ..
+            } => {
+                let (by, request) = (owner.clone(), request.clone());
+                self.changes.push(cycle, Change::Online(ChangeReport::Given { by, request }));
+            }
             RunEvent::ChangeLoaded { texts } => {
+                let loaded = ChangeReport::Loaded(LoadedChange::of(texts));
+                self.changes.push(cycle, Change::Online(loaded));
                 if let Some(change) = self.online_changes.load(texts) {
+                    self.learn_programs(&change);
                     let change = Arc::new(change);
                     self.histories.iter_mut().for_each(|history| history.learn(&change));
                 }
@@ -100,6 +114,19 @@ impl Model {
             | RunEvent::InEffect { .. } => {}
         }
         self.happened(record, cycle, None);
+    }
+
+    /// Scans are explained by the programs of a change too.
+    fn learn_programs(&mut self, change: &OnlineChange) {
+        for changed in &change.programs {
+            let Some(versions) = self.versions.get_mut(changed.program.index()) else {
+                continue;
+            };
+            for hash in [changed.before.hash, changed.after.hash] {
+                let found = self.online_changes.controller(changed.program, hash);
+                found.into_iter().for_each(|controller| versions.learn(controller));
+            }
+        }
     }
 
     fn fault(&mut self, action: Action, member: Member, cycle: i64) {

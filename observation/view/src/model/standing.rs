@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use understudy_journal::Process;
 use understudy_wire::{Force, Member, ProgramId, ProgramSet, SignalPlace, StationId, StationSet};
 
+use crate::online_change::{ChangeReport, ChangeStanding};
 use crate::protection::{LostState, Protection};
 use crate::station::StationStanding;
 
@@ -48,6 +49,7 @@ pub(crate) struct Standing {
     authors: BTreeMap<ProgramId, Member>,
     stations: Vec<StationStanding>,
     programs: Vec<ProgramStanding>,
+    change: ChangeStanding,
     /// What the scenario came to, where it is over and the cluster stays up.
     pub(crate) scenario_over: Option<String>,
 }
@@ -100,6 +102,11 @@ impl Standing {
     /// The remote I/O that drives the outputs of a program, as far as is known.
     pub(crate) fn driver(&self, program: ProgramId) -> Member {
         self.authors.get(&program).copied().unwrap_or(Member::RemoteIo(program))
+    }
+
+    /// What is known of online changes.
+    pub(crate) fn change(&self) -> &ChangeStanding {
+        &self.change
     }
 
     /// Whether a member has ceased to report.
@@ -161,6 +168,7 @@ impl Standing {
             Change::BecameCycleMaster(station) => {
                 self.cycle_masters.insert(*station);
             }
+            Change::Online(report) => self.change.apply(report, cycle),
             Change::ScenarioOver(verdict) => self.scenario_over = Some(verdict.clone()),
             Change::Station(station, change) => {
                 if let Some(own) = self.stations.get_mut(station.index()) {
@@ -179,6 +187,9 @@ impl Standing {
     fn process_changed(&mut self, member: Member, process: Process) {
         self.processes.insert(member, process);
         self.silent.remove(&member);
+        if process == Process::Running {
+            self.change.begins_anew(member);
+        }
         match member {
             Member::Station(station) => {
                 self.cycle_masters.remove(&station);
@@ -203,6 +214,7 @@ impl Standing {
     }
 
     pub(super) fn shift(&mut self, by: i64) {
+        self.change.shift(by);
         for station in &mut self.stations {
             for (_, cycle) in [&mut station.done, &mut station.silenced].into_iter().flatten() {
                 *cycle = cycle.saturating_add(by);
@@ -242,6 +254,8 @@ pub(super) enum Change {
     BecameCycleMaster(StationId),
     /// One of two remote I/Os drives from now on.
     Author(ProgramId, Member),
+    /// Something of an online change.
+    Online(ChangeReport),
     ScenarioOver(String),
     Station(StationId, StationChange),
     Program(ProgramId, ProgramChange),
@@ -259,11 +273,13 @@ impl Change {
             | Self::Detached(_)
             | Self::Silent(_)
             | Self::Reports(_)
+            | Self::Online(ChangeReport::Loaded(_) | ChangeReport::Given { .. })
             | Self::ScenarioOver(_)
             | Self::Station(_, StationChange::Done { .. }) => false,
             Self::Alive(_)
             | Self::BecameCycleMaster(_)
             | Self::Author(..)
+            | Self::Online(ChangeReport::Configured(..))
             | Self::Station(..)
             | Self::Program(..) => true,
         }

@@ -133,6 +133,7 @@ impl Picture<'_> {
                 true => model.spares_in(self.standing),
                 false => Vec::new(),
             },
+            change: model.change_in(self.standing, self.cycle),
             host_stalls: self.host_stalls(),
             alarms,
             process_alarms,
@@ -293,8 +294,8 @@ impl Picture<'_> {
     fn fault(&self, program: ProgramId) -> Option<String> {
         let step = self.model.deadline(program, self.cycle?)?;
         let fault = step.sampled.as_ref()?.fault?;
-        let cluster = self.model.cluster();
-        Some(program_fault_text(cluster, program, Some(&fault)))
+        let controller = self.model.controller_at(program, Some(step.cycle));
+        Some(program_fault_text(controller, Some(&fault)))
     }
 
     fn values(&self, program: ProgramId, driven: Option<&Driven>) -> BTreeMap<String, Value> {

@@ -9,8 +9,8 @@ use std::rc::Rc;
 
 use understudy_ladder::{CoilKind, ContactKind, Element, Evaluation, Program, Reading};
 
-use super::Reason;
 use super::power::{Node, behind, nodes};
+use super::{Reason, end_of_history};
 use crate::error::ViewError;
 use crate::history::History;
 use crate::model::Model;
@@ -145,15 +145,15 @@ impl<'m> Explainer<'m> {
 
     /// The last step before the one at `place` whose scan changed a signal to `value`; the first step that is known where none did.
     fn changed(&self, name: &str, value: bool, place: usize) -> Result<usize, usize> {
-        let controller = &self.model.cluster.controllers()[self.history.program().index()];
-        let circuit = controller.circuit();
+        let version = self.model.version_at(self.history, place).map_err(|_| place)?;
+        let circuit = version.controller().circuit();
         let register = circuit.and_then(|circuit| {
             let mut registers = circuit.registers().iter();
             registers.position(|register| register.name == name)
         });
         let mut at = place;
         loop {
-            let before = self.history.before(at).ok_or(at)?;
+            let before = self.history.scan_before(at).ok_or(at)?;
             let state = self.history.steps()[before].sampled.as_ref();
             let was = register.and_then(|register| Some(state?.state.get(register)));
             if was != Some(value) {
@@ -164,12 +164,8 @@ impl<'m> Explainer<'m> {
     }
 
     /// Why there is nothing before the step at `place`.
-    fn end_of_history(&self, place: usize) -> &'static str {
-        if self.history.begins_at(place) {
-            "its initial value"
-        } else {
-            "unchanged since before the oldest cycle that is remembered"
-        }
+    fn end_of_history(&self, place: usize) -> String {
+        end_of_history(self.history, place)
     }
 
     fn input(&self, name: &str, input: usize, value: bool, place: usize) -> Reason {

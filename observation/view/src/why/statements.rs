@@ -12,7 +12,7 @@ use understudy_typed::{
     Cause, Done, Effect, Elementary, Fault, Part, Program, Read, RoutineId, Trace,
 };
 
-use super::Reason;
+use super::{Reason, end_of_history};
 use crate::error::ViewError;
 use crate::history::History;
 use crate::model::Model;
@@ -137,16 +137,8 @@ impl<'m> Explainer<'m> {
 
     /// The program fault of the newest scan up to `place` that ended in one, with what its statement read.
     pub(super) fn fault(&mut self, name: &str, value: Value, place: usize) -> Option<Reason> {
-        let steps = self.history.steps();
-        let is_new = |at: &usize| {
-            let sampled = steps[*at].sampled.as_ref();
-            sampled.is_some_and(|sampled| sampled.fault_is_new)
-        };
-        let Some(at) = (0..=place).rev().find(is_new) else {
-            self.history.end().reach();
-            return None;
-        };
-        let fault = steps[at].sampled.as_ref()?.fault?;
+        let at = self.history.fault_before(place)?;
+        let fault = self.history.steps()[at].sampled.as_ref()?.fault?;
         let trace = self.trace(at)?;
         let text = format!("program fault: {}", fault.describe(self.program));
         let mut reason = Reason {
@@ -371,7 +363,7 @@ impl<'m> Explainer<'m> {
         let now = stored(place);
         let mut since = place;
         let mut writer = None;
-        while let Some(before) = self.history.before(since) {
+        while let Some(before) = self.history.scan_before(since) {
             if stored(before) != now {
                 writer = Some(before);
                 break;
@@ -379,10 +371,7 @@ impl<'m> Explainer<'m> {
             since = before;
         }
         let Some(writer) = writer else {
-            let text = match self.history.begins_at(since) {
-                true => "its initial value",
-                false => "unchanged since before the oldest cycle that is remembered",
-            };
+            let text = end_of_history(self.history, since);
             return self.leaf(&part.name, value, place, text);
         };
         let when = self.cycle(writer);

@@ -6,6 +6,7 @@
 )]
 
 mod causes;
+mod changed;
 mod complete;
 mod diffs;
 mod directory;

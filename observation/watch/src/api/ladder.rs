@@ -112,20 +112,16 @@ pub(super) async fn picture(
         .map(Json)
 }
 
-fn controller_of(known: &Known, program: ProgramId) -> Answered<&Controller> {
-    let controllers = known.run.cluster().controllers();
-    let controller = controllers.get(program.index());
-    controller.ok_or_else(|| {
-        Problem::unknown(format!(
-            "the cluster has {} programs, not program {}",
-            controllers.len(),
-            program.0
-        ))
+/// With the program that took the sample of a cycle, or that runs.
+fn controller_of(known: &Known, program: ProgramId, cycle: Option<i64>) -> Answered<&Controller> {
+    known.run.controller_at(program, cycle).ok_or_else(|| {
+        let count = known.run.cluster().controllers().len();
+        Problem::unknown(format!("the cluster has {count} programs, not program {}", program.0))
     })
 }
 
 fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answered<Picture> {
-    let controller = controller_of(known, program)?;
+    let controller = controller_of(known, program, Some(cycle))?;
     let Some(ladder) = controller.ladder() else {
         return Ok(match wanted.view {
             View::Text => text(known, program, cycle, wanted.find.trim()),
@@ -269,7 +265,7 @@ pub(super) async fn cross_reference(
     let model = app.model();
     let known = known(&model)?;
     let program = ProgramId(program);
-    let Some(ladder) = controller_of(known, program)?.ladder() else {
+    let Some(ladder) = controller_of(known, program, None)?.ladder() else {
         return Ok(Json(uses(known, program)));
     };
     let (mut read, mut written) = (BTreeMap::new(), BTreeMap::new());

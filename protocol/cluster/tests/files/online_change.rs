@@ -1,7 +1,9 @@
 //! Online changes of ladders: what did not change goes on as if nothing had happened.
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
-use understudy_cluster::{ChangeTexts, Cluster, Code, NeedsStop, fates};
+use understudy_cluster::{ChangeTexts, Cluster, Code, NeedsStop, OnlineChanges, fates};
 use understudy_cycle::{OnlineChange, ProgramChange};
 use understudy_executable::{Executable, Scratch};
 use understudy_ladder::{Coil, CoilKind, Contact, ContactKind, Element, Rung, Signal, print};
@@ -406,4 +408,42 @@ fn values_of_points_keep_their_numbers() {
             assert_eq!(told, [expected], "{values}");
         }
     }
+}
+
+/// Whoever reads a journal from its middle has the newest changes alone, each in the order in which it was loaded last. The programs of all are known.
+#[test]
+fn changes_of_a_run_are_loaded_from_every_configuration_that_is_known() {
+    let numbered = |seconds: usize| {
+        let text =
+            format!("program one\ninput a\noutput y = 0\nrung\n    a {{TON t {seconds}s}} ( y )\n");
+        cluster("one.ladder", &text)
+    };
+    let clusters: Vec<Cluster> = (1..81).map(numbered).collect();
+    let texts = |from: usize, to: usize| {
+        ChangeTexts::between(&clusters[from], &clusters[to]).expect("an online change")
+    };
+    let mut changes = OnlineChanges::of(Arc::new(clusters[0].clone()));
+    let hash = |number: usize| clusters[number].controllers()[0].hash;
+    let program = understudy_wire::ProgramId(0);
+    // Of a configuration that is not known.
+    assert!(changes.load(&texts(2, 3)).is_none());
+    assert!(changes.controller(program, hash(1)).is_none());
+    for (from, to) in [(0, 1), (2, 1), (1, 2), (2, 3), (3, 0), (0, 3)] {
+        let loaded = changes.load(&texts(from, to)).expect("from a known one, or to it");
+        assert_eq!(loaded.name(), texts(from, to).name());
+        for number in [from, to] {
+            let found = changes.controller(program, hash(number)).expect("it is known");
+            assert_eq!(
+                found.code.source().text,
+                clusters[number].controllers()[0].code.source().text
+            );
+        }
+    }
+    // Many that are taken back: the one that runs stays known.
+    for number in 4..80 {
+        assert!(changes.load(&texts(3, number)).is_some(), "{number}");
+        assert!(changes.controller(program, hash(number)).is_some());
+    }
+    assert!(changes.controller(program, hash(0)).is_some(), "the first one");
+    assert!(changes.controller(program, hash(5)).is_none(), "there is a bound");
 }

@@ -4,10 +4,30 @@ use std::collections::{BTreeSet, HashSet};
 use std::fs::{File, read_dir, remove_file, rename};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use understudy_wire::{ProgramHash, Retained, RetainedProgram};
 
 use super::{RetainedFiles, read_bounded};
+
+/// The programs that online changes have brought to a member: its records may be of these. All clones are of one member.
+#[derive(Debug, Clone, Default)]
+pub struct LoadedPrograms(Arc<Mutex<Vec<RetainedProgram>>>);
+
+impl LoadedPrograms {
+    /// These in the place of those before.
+    pub fn are(&self, programs: Vec<RetainedProgram>) {
+        *self.all() = programs;
+    }
+
+    fn find(&self, hash: ProgramHash) -> Option<RetainedProgram> {
+        self.all().iter().find(|program| program.hash == hash).cloned()
+    }
+
+    fn all(&self) -> MutexGuard<'_, Vec<RetainedProgram>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 impl RetainedFiles {
     /// The pairs of files in a folder, or that of one file, in the order of their names.
@@ -58,11 +78,15 @@ impl RetainedFiles {
         }
     }
 
-    /// Writes the text of the program, and removes those that no file needs any more.
-    pub(super) fn keep_program(&self) -> io::Result<()> {
-        let Some(program) = &self.program else {
+    /// Writes the text of the program of a record, and removes those that no file needs any more.
+    pub(super) fn keep_program(&self, hash: ProgramHash) -> io::Result<()> {
+        let Some(own) = &self.program else {
             return Ok(());
         };
+        let loaded = self.loaded.find(hash).filter(|_| own.hash != hash);
+        // An online change keeps the inputs.
+        let loaded = loaded.map(|it| RetainedProgram { inputs: own.inputs.clone(), ..it });
+        let program = loaded.as_ref().unwrap_or(own);
         let Some(bytes) = program.to_bytes() else {
             let reason = format!("the text of the program has {} bytes", program.text.len());
             return Err(io::Error::other(reason));

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
-use understudy_wire::{ProgramId, Retained};
+use understudy_wire::{ProgramHash, ProgramId, Retained};
 
 use super::{RetainedFiles, authority_in, read_bounded};
 use crate::error::BusError;
@@ -126,8 +126,8 @@ pub(super) struct Turn {
     current: Option<File>,
     /// Whether what begins the current file is on the disk: until then the other one is needed.
     is_synced: Arc<AtomicBool>,
-    /// Whether the text of the program is kept.
-    has_program: bool,
+    /// The program whose text is kept.
+    kept: Option<ProgramHash>,
     notes: u32,
     /// Bytes of the current file.
     written: u64,
@@ -159,7 +159,7 @@ impl Turn {
             is_halved,
             current: None,
             is_synced: Arc::default(),
-            has_program: false,
+            kept: None,
             notes: 0,
             written: 0,
             fails_at: None,
@@ -182,15 +182,25 @@ impl Turn {
         failed && self.fails_at.is_none()
     }
 
+    /// Keeps the text of the program of a record: the record is of no use for the next program without it.
+    fn keep_program(&mut self, record: &Retained) -> io::Result<()> {
+        let hash = match record {
+            Retained::State(state) => state.hash,
+            Retained::Note(note) => note.hash,
+            Retained::Step(_) | Retained::Authority(_) => return Ok(()),
+        };
+        if self.kept != Some(hash) {
+            create_dir_all(&self.files.folder)?;
+            self.files.keep_program(hash)?;
+            self.kept = Some(hash);
+        }
+        Ok(())
+    }
+
     /// Begins the other file with a record; the one before stays as it is where that fails.
     fn begin(&mut self, bytes: &[u8]) -> io::Result<Begun> {
         let path = &self.files.paths()[self.next];
         create_dir_all(&self.files.folder)?;
-        if !self.has_program {
-            // A state is of no use for the next program without the text of its own.
-            self.files.keep_program()?;
-            self.has_program = true;
-        }
         let mut content = Vec::new();
         if let Some(authority) = self.files.authority {
             Retained::Authority(authority).write(&mut content);
@@ -298,8 +308,10 @@ impl Writer {
         if begins {
             turn.written = 0;
         }
-        let written =
-            if begins { turn.begin(bytes).map(Some) } else { turn.append(bytes).map(|()| None) };
+        let written = turn.keep_program(record).and_then(|()| match begins {
+            true => turn.begin(bytes).map(Some),
+            false => turn.append(bytes).map(|()| None),
+        });
         let begun = written.map_err(|error| {
             if of.is_none() {
                 turn.remove_both();

@@ -23,7 +23,7 @@ impl Explainer<'_> {
             found
         })?;
         let is_before = rung < below || rung == below && self.is_before(rung, name, element);
-        let place = if is_before { place } else { self.history.before(place)? };
+        let place = if is_before { place } else { self.history.scan_before(place)? };
         self.block_at(name, rung, place, depth)
     }
 
@@ -87,7 +87,7 @@ impl Explainer<'_> {
     /// CV of a counter after the scan before that of a step.
     fn count_before(&mut self, name: &str, rung: usize, place: usize) -> Option<u16> {
         let element = self.place_of_block(name, rung)?;
-        let before = self.history.before(place)?;
+        let before = self.history.scan_before(place)?;
         let evaluation = self.evaluation(before)?;
         match evaluation.rungs[rung].elements.get(element)?.reading {
             Reading::Number(count) => Some(count),
@@ -163,7 +163,7 @@ impl Explainer<'_> {
             BlockKind::Sr | BlockKind::Rs => {
                 if leaves && !enters {
                     let (since, _) = self.unchanged(name, rung, place, |flow| flow.enters);
-                    let set = self.history.before(since).unwrap_or(since);
+                    let set = self.history.scan_before(since).unwrap_or(since);
                     return (
                         format!("set in cycle {}, and kept since", self.cycle(set)),
                         Some(set),
@@ -206,8 +206,8 @@ impl Explainer<'_> {
             return (place, false);
         };
         for _ in 0..FARTHEST {
-            let Some(before) = self.history.before(at) else {
-                return (at, self.end_of_history(at) == "its initial value");
+            let Some(before) = self.history.scan_before(at) else {
+                return (at, self.history.begins_at(at));
             };
             // Not kept: there may be thousands.
             let evaluation = self.model.evaluation_at(self.history, before).ok();

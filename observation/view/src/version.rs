@@ -1,0 +1,125 @@
+//! The programs that were in the place of one program in a run: that with which it began, and those that online changes brought.
+//!
+//! A scan is explained by the program that took it: the text, the rungs and the variables are those of that one.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use understudy_cluster::Controller;
+use understudy_interchange::{Bodies, DrawnUnit, drawn_units};
+use understudy_ladder::Observer;
+use understudy_typed::Interpreter;
+use understudy_wire::ProgramHash;
+
+use crate::state_signal::{self, StateSignal};
+
+/// Programs in the place of one that are kept, at most.
+const MOST: usize = 32;
+
+/// One program, with what is made of it when it is asked for.
+#[derive(Debug, Clone)]
+pub(crate) struct Version {
+    controller: Controller,
+    observer: OnceLock<Option<Observer>>,
+    interpreter: OnceLock<Option<Interpreter>>,
+    drawing: OnceLock<Vec<DrawnUnit>>,
+    signals: OnceLock<BTreeMap<String, StateSignal>>,
+}
+
+impl Version {
+    fn of(controller: &Controller) -> Self {
+        Self {
+            controller: controller.clone(),
+            observer: OnceLock::new(),
+            interpreter: OnceLock::new(),
+            drawing: OnceLock::new(),
+            signals: OnceLock::new(),
+        }
+    }
+
+    /// The controller with this program.
+    pub(crate) fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// Of a ladder.
+    pub(crate) fn observer(&self, period: Duration) -> Option<&Observer> {
+        let observer = || Observer::new(self.controller.ladder()?, period).ok();
+        self.observer.get_or_init(observer).as_ref()
+    }
+
+    /// Of a program with statements.
+    pub(crate) fn interpreter(&self) -> Option<&Interpreter> {
+        let code = &self.controller.code;
+        let interpreter = || code.source_text().map(|_| Interpreter::new(code.typed()));
+        self.interpreter.get_or_init(interpreter).as_ref()
+    }
+
+    /// Its units as they are drawn, of a program with statements.
+    pub(crate) fn drawing(&self) -> &[DrawnUnit] {
+        self.drawing.get_or_init(|| {
+            let Some(text) = self.controller.code.source_text() else {
+                return Vec::new();
+            };
+            // A document begins with a sign that no Structured Text begins with.
+            let is_document = text.trim_start().starts_with('<');
+            let name = if is_document { "program.xml" } else { "program.st" };
+            drawn_units(name, text, Bodies::Blocks).unwrap_or_default()
+        })
+    }
+
+    /// A signal of its state that is that one: the same, or the one of that name and type in another program.
+    pub(crate) fn signal<'s>(&'s self, of: &'s StateSignal) -> Option<&'s StateSignal> {
+        if of.program() == self.controller.hash {
+            return Some(of);
+        }
+        let signals = self.signals.get_or_init(|| {
+            let signals = state_signal::of_controller(&self.controller).into_iter();
+            signals.map(|signal| (signal.name.clone(), signal)).collect()
+        });
+        signals.get(&of.name).filter(|own| own.of == of.of)
+    }
+}
+
+/// The programs in the place of one.
+#[derive(Debug, Clone)]
+pub(crate) struct Versions {
+    first: Version,
+    /// Of online changes, the newest last.
+    changed: Vec<Version>,
+}
+
+impl Versions {
+    /// Of a run that begins with this one.
+    pub(crate) fn of(first: &Controller) -> Self {
+        Self { first: Version::of(first), changed: Vec::new() }
+    }
+
+    /// Its program may become this one.
+    pub(crate) fn learn(&mut self, controller: &Controller) {
+        if controller.hash == self.first.controller.hash {
+            return;
+        }
+        let known = self.changed.iter().position(|it| it.controller.hash == controller.hash);
+        let version = match known {
+            Some(known) => self.changed.remove(known),
+            None => Version::of(controller),
+        };
+        self.changed.push(version);
+        if self.changed.len() == MOST {
+            self.changed.remove(0);
+        }
+    }
+
+    /// That with which the run began.
+    pub(crate) fn first(&self) -> &Version {
+        &self.first
+    }
+
+    /// The one with this hash.
+    pub(crate) fn find(&self, program: ProgramHash) -> Option<&Version> {
+        let all = std::iter::once(&self.first).chain(&self.changed);
+        all.into_iter().find(|version| version.controller.hash == program)
+    }
+}
