@@ -163,3 +163,16 @@ fn two_failures_never_add_up_to_more_than_the_whole() {
         assert!(flows.iter().all(|(_, flow)| *flow <= OPEN), "{faults:?}");
     }
 }
+
+/// The two do not receive each other, and the stations receive both: they follow the author, so nobody is asked who that is.
+#[test]
+fn a_cut_between_the_two_asks_nobody() {
+    for after in 1..=3 {
+        let cuts = [(FIRST, TWIN), (TWIN, FIRST)];
+        let cuts = cuts.map(|(member, to)| fault(100, 0.4, member, Action::Cut { to }));
+        let (_, simulation) = run(cell(after, STEADY), &cuts, 400);
+        assert_eq!(simulation.violations(), [], "{after}");
+        assert!(!simulation.asking().contains(PROGRAM), "{after}");
+        assert_eq!(simulation.author(PROGRAM), Some(FIRST), "{after}");
+    }
+}

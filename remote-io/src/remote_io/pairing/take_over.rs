@@ -101,7 +101,10 @@ impl RemoteIo {
             }
             (true, true) => pairing.refused = 0,
             (false, _) => {
-                pairing.refused = pairing.refused.saturating_add(u32::from(receives));
+                // One that follows the author needs nobody to decide who that is.
+                let is_followed = pairing.reports.iter().any(|it| it.lacks == Some(false));
+                let more = pairing.refused.saturating_add(u32::from(receives));
+                pairing.refused = if is_followed { 0 } else { more };
                 let refused = pairing.refused;
                 self.ask_who_begins(refused);
             }
