@@ -76,6 +76,8 @@ struct CheckedFile {
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
+    /// Programs of a cluster or a project that have errors.
+    wrong_programs: usize,
     /// Whether the time limit ended the optional checks early.
     cut_short: bool,
     /// Memory and time of a program with numbers.
@@ -122,6 +124,7 @@ struct Found<'a> {
     /// The named files, in their order.
     given: Vec<(Kind, &'a Path)>,
     cut_short: Vec<String>,
+    wrong_programs: Vec<(String, usize)>,
     sizes: Vec<(String, Size)>,
     retained: Vec<(String, Retained)>,
     libraries: Vec<(String, Vec<String>)>,
@@ -350,6 +353,11 @@ impl Found<'_> {
 
     /// Reports on a file and the ladders that it names.
     fn add_with_ladders(&mut self, kind: Kind, reports: Vec<Report>) {
+        let wrong = reports.iter().skip(1).filter(|report| count(report, Severity::Error) > 0);
+        let wrong = wrong.count();
+        if let Some(first) = reports.first() {
+            self.wrong_programs.push((first.name.clone(), wrong));
+        }
         for (index, report) in reports.into_iter().enumerate() {
             self.add(if index == 0 { kind } else { Kind::Program }, report);
         }
@@ -363,15 +371,12 @@ impl Found<'_> {
     }
 
     fn answer(self) -> Answer {
-        let count = |report: &Report, severity| {
-            let diagnostics = report.diagnostics.iter();
-            diagnostics.filter(|diagnostic| diagnostic.severity == severity).count()
-        };
         let checked = self.reports.iter().map(|(kind, report)| CheckedFile {
             name: report.name.clone(),
             kind: Some(kind.word()),
             errors: count(report, Severity::Error),
             warnings: count(report, Severity::Warning),
+            wrong_programs: found_of(&self.wrong_programs, &report.name).unwrap_or(0),
             cut_short: self.cut_short.contains(&report.name),
             size: found_of(&self.sizes, &report.name),
             retained: found_of(&self.retained, &report.name),
@@ -382,6 +387,7 @@ impl Found<'_> {
             kind: None,
             errors: 1,
             warnings: 0,
+            wrong_programs: 0,
             cut_short: false,
             size: None,
             retained: None,
@@ -393,11 +399,13 @@ impl Found<'_> {
         let mut text = String::new();
         let width = files.iter().map(|file| file.name.chars().count()).max().unwrap_or(0);
         for file in &files {
-            let verdict = match (file.errors, file.warnings) {
-                (0, 0) => "right".to_owned(),
-                (0, warnings) => format!("right, {}", number(warnings, "warning")),
-                (errors, 0) => number(errors, "error"),
-                (errors, warnings) => {
+            let verdict = match (file.errors, file.warnings, file.wrong_programs) {
+                (0, 0, 0) => "right".to_owned(),
+                (0, warnings, 0) => format!("right, {}", number(warnings, "warning")),
+                (0, _, 1) => "1 of its programs has errors".to_owned(),
+                (0, _, wrong) => format!("{wrong} of its programs have errors"),
+                (errors, 0, _) => number(errors, "error"),
+                (errors, warnings, _) => {
                     format!("{}, {}", number(errors, "error"), number(warnings, "warning"))
                 }
             };
@@ -426,6 +434,11 @@ impl Found<'_> {
         answer.failures = self.failures;
         answer
     }
+}
+
+fn count(report: &Report, severity: Severity) -> usize {
+    let diagnostics = report.diagnostics.iter();
+    diagnostics.filter(|diagnostic| diagnostic.severity == severity).count()
 }
 
 /// What was found out about the file of a name.

@@ -52,6 +52,24 @@ fn everything_that_is_wrong_is_found_at_once() {
     assert_eq!(document["failures"][0]["code"], "U0601");
 }
 
+/// The file itself has no error, and no cluster is made of it.
+#[test]
+fn a_cluster_with_a_wrong_program_is_not_right() {
+    let folder = empty_folder("wrong_program");
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("written");
+    let cluster = "[cluster]\nname = \"cell\"\n\n[[controller]]\nname = \"pump\"\nladder = \"pump.ladder\"\n\n[[remote_io]]\ncontroller = \"pump\"\n";
+    write("cluster.toml", cluster);
+    write("pump.ladder", "program pump\ninput full\noutput run\nrung\n  /ful ( run )\n");
+    let answer = understudy_in(&folder, &["check", "cluster.toml"]);
+    assert_eq!(answer.status, 2);
+    assert!(answer.output.contains("cluster   1 of its programs has errors"), "{}", answer.output);
+    let document = understudy_in(&folder, &["check", "cluster.toml", "--json"]).json();
+    let files = document["result"]["files"].as_array().expect("files");
+    let found = files.iter().map(|file| (&file["errors"], &file["wrong_programs"]));
+    let found: Vec<_> = found.map(|(errors, wrong)| (errors.as_u64(), wrong.as_u64())).collect();
+    assert_eq!(found, [(Some(0), Some(1)), (Some(1), Some(0))]);
+}
+
 #[test]
 fn a_scenario_is_checked_against_the_cluster_beside_it() {
     let folder = empty_folder("beside");
