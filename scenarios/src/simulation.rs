@@ -85,7 +85,7 @@ pub fn simulate(
         };
         let moment = applied.as_ref().map(|(moment, _)| *moment);
         take(&record, moment.zip(cycle));
-        let (Some((moment, outputs)), Member::RemoteIo(program)) = (applied, member) else {
+        let (Some((moment, outputs)), Some(program)) = (applied, member.sampled_program()) else {
             return;
         };
         if let Some(field) = fields[program.index()].take() {

@@ -1,8 +1,10 @@
-//! Twins of remote I/Os that cannot work: `understudy check` refuses each with a code, in words of the cluster file.
+//! Twins of remote I/Os: those that cannot work are refused by `understudy check`, each with a code, in words of the cluster file.
 
 use std::fs;
 
-use crate::{empty_folder, understudy_in};
+use serde_json::Value;
+
+use crate::{empty_folder, understudy, understudy_in};
 
 const PUMP: &str = "program pump\ninput full\noutput run\nrung \"run\"\n  /full ( run )\n";
 
@@ -86,4 +88,25 @@ fn twins_that_cannot_work_are_refused_in_words_of_the_cluster_file() {
     check(pump("", &parallel("owner_timeout = \"25ms\""), ""), "U0259", &["owner_timeout"]);
     let number = cell("tank.st", "", &parallel(""), "");
     check(number, "U0260", &["`valve` is REAL", "drive outputs of bits only", "exclusive"]);
+}
+
+/// While the twin drives, the plant moves on, and its steps are in the journal, the figure and the account as before.
+#[test]
+fn a_plant_is_recorded_whichever_of_two_remote_ios_drives_it() {
+    let out = empty_folder("plant_of_twins");
+    let cell = "examples/twin-remote-io/";
+    let [cluster, scenario] = ["cluster.toml", "author-fails.toml"].map(|it| cell.to_owned() + it);
+    let to = out.to_str().expect("text");
+    let simulated =
+        understudy(&["simulate", &cluster, "--scenario", &scenario, "--seed", "1", "--out", to]);
+    assert_eq!(simulated.status, 0, "{}", simulated.errors);
+    let journal = fs::read_to_string(out.join("latest/journal.jsonl")).expect("a journal");
+    let records = journal.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    let steps = records.filter(|record| record["event"]["event"] == "stepped");
+    let steps: Vec<String> = steps.map(|record| record["name"].to_string()).collect();
+    // Of 1,000 cycles one or two have no driver.
+    for plant in ["\"arm\"", "\"ram\""] {
+        let count = steps.iter().filter(|member| *member == plant).count();
+        assert!(count >= 990, "{plant}: {count}");
+    }
 }
