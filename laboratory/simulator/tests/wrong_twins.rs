@@ -79,22 +79,16 @@ fn again(cycle: u64, phase: f64, member: Member, action: Action) -> [Step; 2] {
 /// one has started is known then. Found by a campaign.
 #[test]
 fn what_the_other_one_has_started_is_known_when_the_program_is_right_again() {
-    for (wire, wrong, programs) in WIRINGS
-        .into_iter()
-        .flat_map(|wire| [FIRST, TWIN].map(|wrong| (wire, wrong)))
-        .flat_map(|(wire, wrong)| [1, 2].map(|programs| (wire, wrong, programs)))
-    {
+    let cases = [FIRST, TWIN].into_iter().flat_map(|wrong| [(wrong, 1), (wrong, 2)]);
+    for ((wrong, programs), wire) in cases.flat_map(|case| WIRINGS.map(|wire| (case, wire))) {
         for tenth in 0..10 {
             let phase = f64::from(tenth) / 10.0;
             let stations = (0..=programs).map(|rank| Member::Station(StationId(rank as u8)));
             let all: Vec<Member> = stations.chain([FIRST, TWIN]).collect();
             let mut steps: Vec<Step> = Vec::new();
             for &member in &all {
-                let action = if member == wrong {
-                    Action::RestartWrongProgram
-                } else {
-                    Action::Restart
-                };
+                let action =
+                    if member == wrong { Action::RestartWrongProgram } else { Action::Restart };
                 steps.push((50, phase, member, Action::Crash));
                 steps.push((60, phase, member, action));
             }
@@ -140,9 +134,7 @@ fn a_wrong_program_of_one_of_two_drives_nothing() {
             .flat_map(|wrong| [CONTROLLER, understudy(programs)].map(|it| (wrong, it)))
         {
             for (one, two) in [(wrong, station), (station, wrong)] {
-                for (apart, phase) in
-                    [0, 1, 3, 40].iter().flat_map(|apart| [0.0, 0.3, 0.6, 0.9].map(|it| (apart, it)))
-                {
+                for (apart, phase) in [(0, 0.1), (0, 0.6), (1, 0.1), (1, 0.6), (40, 0.6)] {
                     let mut steps = Vec::new();
                     steps.extend(again(50, phase, one, Action::RestartWrongProgram));
                     steps.extend(again(50 + apart, phase, two, Action::RestartWrongProgram));
@@ -154,6 +146,36 @@ fn a_wrong_program_of_one_of_two_drives_nothing() {
                     assert_eq!(outcome.wrong, 0, "{case}");
                 }
             }
+        }
+    }
+}
+
+/// After a power failure one of the two and a station start with one and the same wrong program, the others with the right one, in any order: nothing is driven
+/// until all have the right one, and then that.
+#[test]
+fn a_wrong_program_after_a_power_failure_drives_nothing() {
+    for (wire, wrong) in WIRINGS.into_iter().flat_map(|wire| [FIRST, TWIN].map(|it| (wire, it))) {
+        for order in (0..256_usize).step_by(7) {
+            let after = |place: usize| [0, 2, 30, 120][order >> (2 * place) & 3];
+            let (station, right) = match order % 2 == 0 {
+                true => (CONTROLLER, understudy(1)),
+                false => (understudy(1), CONTROLLER),
+            };
+            let phase = (order % 10) as f64 / 10.0;
+            let all = [wrong, station, other(wrong), right];
+            let mut steps: Vec<Step> = Vec::new();
+            for (place, member) in all.into_iter().enumerate() {
+                let action = if place < 2 { Action::RestartWrongProgram } else { Action::Restart };
+                steps.push((50, phase, member, Action::Crash));
+                steps.push((60 + after(place), phase, member, action));
+            }
+            steps.extend(again(260, phase, wrong, Action::Restart));
+            steps.extend(again(260, phase, station, Action::Restart));
+            let outcome = run(parts(wire, 1), &steps, 360);
+            let case = format!("{wrong:?} and {station:?} in the order {order}");
+            assert_eq!(outcome.violations, [], "{case}");
+            let right: u64 = outcome.right.iter().sum();
+            assert!(outcome.wrong == 0 && (50..=100).contains(&right), "{case}: {right}");
         }
     }
 }
