@@ -103,8 +103,8 @@ pub struct Simulation {
     holders: Vec<[StationSet; 2]>,
     /// What the members can know of the stations that could have a state whose outputs were applied.
     knowable: Knowable,
-    /// For each remote I/O, what is known of it while it has a wrong program.
-    misled: Vec<Option<Misled>>,
+    /// What is known of each remote I/O that has a wrong program.
+    misled: Misled,
     /// Stations that have sent nothing since they were restarted: no member can know that they run.
     unannounced: StationSet,
     violations: Vec<Violation>,
@@ -184,7 +184,7 @@ impl Simulation {
             arrived: vec![[StationSet::EMPTY; 3]; parts.remote_ios.len()],
             holders: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
             knowable: Knowable::new(parts.stations.len(), parts.remote_ios.len()),
-            misled: vec![None; parts.remote_ios.len()],
+            misled: Misled::default(),
             unannounced: StationSet::EMPTY,
             violations: Vec::new(),
             faults: Vec::new(),
@@ -366,10 +366,9 @@ impl Simulation {
     // ── one event ───────────────────────────────────────────────────────────────────────────────────────────────────
 
     fn advance(&mut self, observe: &mut Observe<'_>) {
-        let never = Time(u64::MAX);
-        let arrival = self.links.next_at().unwrap_or(never);
+        let arrival = self.links.next_at().unwrap_or(NEVER);
         let (wakeup, sleeper) = self.wakeups.next();
-        let fault = self.next_fault_at().unwrap_or(never);
+        let fault = self.next_fault_at().unwrap_or(NEVER);
         let next = arrival.min(wakeup).min(fault).min(self.pace.overdue_at());
         self.now = self.now.max(next);
         if arrival == next {
@@ -377,6 +376,7 @@ impl Simulation {
                 self.deliver(&delivery, observe);
             }
         } else if wakeup == next {
+            self.note_wakeup(sleeper);
             self.give(sleeper, Input::Wakeup, observe);
         } else if fault == next {
             if let Some(fault) = self.faults.pop() {

@@ -144,13 +144,10 @@ impl Draw<'_> {
         (from..(from + cycles).min(self.cycles.end - 1), phase)
     }
 
-    /// A remote I/O, or the second one of its program as often; operators write to the first one, and a wrong program is given to it.
+    /// A remote I/O, or the second one of its program as often; operators write to the first one.
     fn or_its_twin(&mut self, member: Member, kind: Kind) -> Member {
         match member {
-            Member::RemoteIo(program)
-                if self.twins.contains(program)
-                    && !matches!(kind, Kind::Write | Kind::WrongProgram) =>
-            {
+            Member::RemoteIo(program) if self.twins.contains(program) && kind != Kind::Write => {
                 self.one_of(&[member, Member::Twin(program)])
             }
             _ => member,
@@ -210,9 +207,7 @@ impl Draw<'_> {
                 ]
             }
             Kind::WrongProgram => {
-                let Member::RemoteIo(program) = member else {
-                    return None;
-                };
+                let program = member.sampled_program()?;
                 let station = match Role::Understudy.members(schedule).next() {
                     Some(understudy) if self.random.random_range(0..2) == 0 => understudy,
                     _ => Member::Station(StationId(program.0)),
@@ -373,9 +368,9 @@ impl Draw<'_> {
     }
 
     fn others(&self, member: Member) -> Vec<Member> {
-        let members = Role::ALL.into_iter();
+        let members = Role::ALL.into_iter().flat_map(|role| role.members(self.schedule));
         members
-            .flat_map(|role| role.members(self.schedule))
+            .chain(self.twins.iter().map(Member::Twin))
             .filter(|other| *other != member)
             .collect()
     }

@@ -206,6 +206,47 @@ fn a_campaign_may_end_early() {
     assert_eq!(run(&first, 2).coverage, early.coverage);
 }
 
+/// The second remote I/O of a program fails with the power of all, is alone where it is isolated, and may have a wrong program.
+#[test]
+fn faults_strike_the_second_remote_io_too() {
+    let text = "[cluster]\nname = \"twins\"\nperiod = \"10ms\"\n\
+         [[controller]]\nname = \"robot\"\nladder = \"robot.ladder\"\n[[understudy]]\nname = \"u\"\n\
+         [[remote_io]]\nname = \"io\"\ncontroller = \"robot\"\ntwin = { name = \"io-2\", wiring = \"exclusive\" }\n\
+         [[plant]]\nname = \"arm\"\ncontroller = \"robot\"\nmodel = \"robot\"\nwatchdog_cycles = 4\n";
+    let cluster = understudy_testing::cluster(text, Mode::Full);
+    let target = Target::of(&cluster);
+    let faults = |kind: Kind| {
+        let plan = plan(40, Property::Wrong, &[kind]);
+        let runs = (0..40).flat_map(|run| plan.draw(&target, run).0.injections);
+        runs.collect::<Vec<Injection>>()
+    };
+    let program = understudy_wire::ProgramId(0);
+    let (first, twin) = (Member::RemoteIo(program), Member::Twin(program));
+    for injection in faults(Kind::PowerFailure) {
+        for action in [Action::Crash, Action::Restart] {
+            let steps = injection.steps.iter().filter(|step| step.action == action);
+            let mut members: Vec<Member> = steps.map(|step| step.member).collect();
+            members.sort_unstable();
+            let stations = [0, 1].map(|rank| Member::Station(StationId(rank)));
+            assert_eq!(members, [&stations[..], &[first, twin]].concat());
+        }
+    }
+    for injection in faults(Kind::Isolation) {
+        let alone = injection.steps[0].member;
+        let cuts = |from: Member, to: Member| {
+            injection.steps.iter().any(|it| (it.member, it.action) == (from, Action::Cut { to }))
+        };
+        for other in [first, twin].into_iter().filter(|other| *other != alone) {
+            assert!(cuts(alone, other) && cuts(other, alone), "{alone:?} and {other:?}");
+        }
+    }
+    for member in [first, twin] {
+        let is_wrong =
+            |step: &Fault| step.member == member && step.action == Action::RestartWrongProgram;
+        assert!(faults(Kind::WrongProgram).iter().any(|it| it.steps.iter().any(is_wrong)));
+    }
+}
+
 #[test]
 fn the_page_shows_every_row() {
     let findings = run(&plan(20, Property::Held, &Kind::ALL), 2);

@@ -187,9 +187,7 @@ impl Simulation {
                 if has_wrong_programs {
                     settings.hash = wrong_hash(settings.hash);
                 }
-                let misled = &mut self.misled[program.index()];
-                // It may go on with what its stations have started with it before.
-                *misled = has_wrong_programs.then(|| misled.unwrap_or_default());
+                self.misled.restarts(member, has_wrong_programs);
                 let change = self.parts.change.clone();
                 let machine = self.disks.remote_io(self.now, settings, change.as_ref());
                 let own = machine.configurations().own;

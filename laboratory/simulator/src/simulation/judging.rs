@@ -1,21 +1,47 @@
 //! What the referees are shown of a remote I/O, and what they say.
 
+use std::collections::BTreeMap;
+
 use understudy_remote_io::{Event, RemoteIo};
-use understudy_wire::{Frame, Lineage, Member, Moment, ProgramId, Source, StationId, StationSet};
+use understudy_wire::{
+    Frame, Lineage, Member, Moment, Part, ProgramId, Source, StationId, StationSet,
+};
 
 use super::knowable::CYCLES_TO_TELL;
 use super::{Observe, Record, Simulation};
 use crate::referee::Violation;
 
+/// The remote I/Os that have a wrong program. The two of one program are judged each by its own.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub(super) struct Misled(BTreeMap<Member, WrongProgram>);
+
+impl Misled {
+    /// A remote I/O starts again. With a wrong program it may go on with what its stations have started with it before.
+    pub(super) fn restarts(&mut self, member: Member, has_wrong_program: bool) {
+        let before = self.0.remove(&member);
+        if has_wrong_program {
+            self.0.insert(member, before.unwrap_or_default());
+        }
+    }
+}
+
 /// A remote I/O with a wrong program, as the referee knows it: by who runs and whom it can receive, and not by what it says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub(super) struct Misled {
+struct WrongProgram {
     /// Stations with another configuration that had sent something since they started and that it could receive at its last deadline, and at the
     /// one before.
     contradicted_by: [StationSet; 2],
     /// Whether the wrong program may run: the operator has chosen its cold start, or it has started where the remote I/O can receive more
     /// stations with its configuration than with another one. No member can tell then which of the two is right.
     is_permitted: bool,
+}
+
+impl WrongProgram {
+    /// A deadline is over.
+    fn is_contradicted_by(&mut self, others: StationSet) {
+        let [last, _] = self.contradicted_by;
+        self.contradicted_by = [others, last];
+    }
 }
 
 impl Simulation {
@@ -27,7 +53,7 @@ impl Simulation {
         observe: &mut Observe<'_>,
     ) {
         let too_much = self.judge_sum(program, event);
-        if self.may_be_misled(program, event) {
+        if self.may_be_misled(member, program, event) {
             self.ready.remove(program);
             self.tallies[program.index()].count(event);
             return;
@@ -88,32 +114,44 @@ impl Simulation {
     }
 
     /// Takes an event of a remote I/O, and tells whether it may drive a wrong program, so that nothing that it applies is judged.
-    fn may_be_misled(&mut self, program: ProgramId, event: &Event) -> bool {
-        let Some(mut misled) = self.misled[program.index()] else {
+    fn may_be_misled(&mut self, member: Member, program: ProgramId, event: &Event) -> bool {
+        let Some(mut misled) = self.misled.0.get(&member).copied() else {
             return false;
         };
         match event {
-            Event::Applied { .. } => {
-                let (_, others) = self.received_by(program);
-                let others = others.without(self.unannounced);
-                let [last, _] = misled.contradicted_by;
-                misled.contradicted_by = [others, last];
-            }
+            Event::Applied { .. } => misled.is_contradicted_by(self.contradicting(member)),
             Event::StartedCold { .. } => {
-                let (own, _) = self.received_by(program);
+                let (own, _) = self.received_by(member);
                 let [last, earlier] = misled.contradicted_by;
                 let chosen = self.referees[program.index()].operator_may_choose();
                 misled.is_permitted = chosen || own.len() > last.and(earlier).len();
             }
             _ => {}
         }
-        self.misled[program.index()] = Some(misled);
+        self.misled.0.insert(member, misled);
         misled.is_permitted
     }
 
-    /// Stations that run and that the remote I/O of a program can receive: those with its configuration, and the others.
-    fn received_by(&self, program: ProgramId) -> (StationSet, StationSet) {
-        let member = self.author(program).unwrap_or(Member::RemoteIo(program));
+    /// A member wakes. For one of two remote I/Os that does not drive, that is its deadline, which it does not report.
+    pub(super) fn note_wakeup(&mut self, member: Member) {
+        let Some(mut misled) = self.misled.0.get(&member).copied() else {
+            return;
+        };
+        let part = self.running_remote_io(member).and_then(RemoteIo::part);
+        if part.is_some_and(|part| part != Part::Author) {
+            misled.is_contradicted_by(self.contradicting(member));
+            self.misled.0.insert(member, misled);
+        }
+    }
+
+    /// Stations with another configuration that have sent something since they started, and that a remote I/O can receive.
+    fn contradicting(&self, member: Member) -> StationSet {
+        let (_, others) = self.received_by(member);
+        others.without(self.unannounced)
+    }
+
+    /// Stations that run and that a remote I/O can receive: those with its configuration, and the others.
+    fn received_by(&self, member: Member) -> (StationSet, StationSet) {
         let remote_io = self.running_remote_io(member);
         let own = remote_io.map(RemoteIo::configurations);
         let (mut equal, mut others) = (StationSet::EMPTY, StationSet::EMPTY);
