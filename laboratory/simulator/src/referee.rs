@@ -44,6 +44,8 @@ pub use violation::Violation;
 
 /// States that are remembered, at most, where some of them lie before the floor; the oldest are forgotten.
 const REMEMBERED: usize = 1024;
+/// Programs of changes that are over, which are known at most.
+const EARLIER_PROGRAMS: usize = 64;
 /// States that are remembered from the floor on: for ten minutes of 10 ms cycles of which nothing is applied. The floor is never forgotten.
 const REMEMBERED_FROM_FLOOR: usize = 65_536;
 
@@ -59,6 +61,8 @@ pub struct Referee {
     program: Program,
     /// The online change that its program may go through.
     change: Option<Arc<OnlineChange>>,
+    /// Its programs in changes before that one, the newest last.
+    earlier: Vec<Program>,
     place: ProgramId,
     fallbacks: Fallbacks,
     scratch: Scratch,
@@ -118,6 +122,7 @@ impl Referee {
         Self {
             program: Program { hash: settings.hash, executable },
             change: None,
+            earlier: Vec::new(),
             place: settings.program,
             fallbacks: Fallbacks::new(settings.agreement.configuration, settings.fallback.clone()),
             scratch: Scratch::default(),
@@ -147,9 +152,16 @@ impl Referee {
         self
     }
 
-    /// From now on the program may change by this.
+    /// From now on the program may change by this. The programs of changes before it stay known: one of them runs on where this change is of others.
     pub fn learn(&mut self, change: &Arc<OnlineChange>) {
-        self.change = Some(Arc::clone(change));
+        let last = self.change.replace(Arc::clone(change));
+        let of_program = last.as_ref().and_then(|last| last.of(self.place));
+        for program in of_program.into_iter().flat_map(|last| [&last.before, &last.after]) {
+            self.earlier.retain(|known| known.hash != program.hash);
+            self.earlier.push(program.clone());
+        }
+        let more = self.earlier.len().saturating_sub(EARLIER_PROGRAMS);
+        self.earlier.drain(..more);
     }
 
     /// The program that takes a step from the state of a lineage, and its state before the step, where they are known.
@@ -164,10 +176,14 @@ impl Referee {
 
     /// Whether a state is the one in which a program begins that is started cold.
     pub fn is_initial(&self, program: ProgramHash, state: &Image) -> bool {
-        let program = self.versions().of(program);
-        program.is_some_and(|it| {
+        self.program_with(program).is_some_and(|it| {
             it.executable.state_count() == state.width() && it.executable.initial() == state.words()
         })
+    }
+
+    /// The program with this hash, of this change or one before it.
+    fn program_with(&self, hash: ProgramHash) -> Option<&Program> {
+        self.versions().of(hash).or_else(|| self.earlier.iter().find(|it| it.hash == hash))
     }
 
     fn versions(&self) -> Versions<'_> {
@@ -298,7 +314,7 @@ impl Referee {
     pub fn goes_on_from(&mut self, (of, lineage): (Option<ProgramHash>, Lineage), bits: Image) {
         let hash = of.unwrap_or(self.program.hash);
         let fits = |program: &Program| program.executable.state_count() == bits.width();
-        if !self.versions().of(hash).is_some_and(fits) {
+        if !self.program_with(hash).is_some_and(fits) {
             return;
         }
         self.truth = None;
@@ -354,8 +370,9 @@ impl Referee {
                 Err(Violation::WentBack { moment, from, applied })
             };
         }
-        let started = self.versions().all().find(|it| before == Lineage::genesis(it.hash, born));
-        if let Some(Program { hash, executable }) = started.cloned() {
+        let all = self.versions().all().chain(&self.earlier);
+        let started = { all }.find(|it| before == Lineage::genesis(it.hash, born)).cloned();
+        if let Some(Program { hash, executable }) = started {
             self.choice = 0;
             self.cold_starts += 1;
             self.applied = false;
@@ -398,7 +415,7 @@ impl Referee {
         let chosen = std::mem::take(&mut self.choice) > 0;
         let state = &self.states[from];
         let (stepped, applied) = (state.stepped, self.states[self.floor].stepped);
-        let program = self.versions().of(state.program).unwrap_or(&self.program).clone();
+        let program = self.program_with(state.program).unwrap_or(&self.program).clone();
         let bits = program.executable.restarted(state.bits.words());
         let bits = Image::from_words(program.executable.state_count(), &bits);
         let bits = bits.expect("a state of this program is packed");

@@ -126,6 +126,14 @@ impl Place {
         matches!(self, Self::Number(registers) if registers.offset != 0.0)
     }
 
+    /// Whether its registers hold whole numbers, and a number of this type is rounded to them.
+    pub fn rounds(&self, of: Elementary) -> bool {
+        let Self::Number(registers) = self else {
+            return false;
+        };
+        !registers.of.is_real() && (of.is_real() || registers.scale != 1.0)
+    }
+
     /// How places are written.
     pub const EXAMPLES: &str = "\"discrete:0\", \"coil:3\", \"input:10.4\" or \"holding:10.4\" (register and bit) for a BOOL, and \"input:10 real\" \
          or \"holding:10 int\" (first register and type) for a number";

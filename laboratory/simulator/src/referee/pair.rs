@@ -146,7 +146,8 @@ impl Referee {
             .find(|state| state.program == program && state.lineage.after(inputs) == lineage)?;
         let mut bits = before.bits.clone();
         let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
-        let executable = &versions.of(program)?.executable;
+        let earlier = || self.earlier.iter().find(|it| it.hash == program);
+        let executable = &versions.of(program).or_else(earlier)?.executable;
         Some(scan(executable, &mut self.scratch, &mut bits, inputs))
     }
 

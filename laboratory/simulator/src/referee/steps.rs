@@ -45,7 +45,8 @@ impl Referee {
             return self.misses_records();
         };
         let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
-        let Some(program) = versions.of(hash) else {
+        let earlier = || self.earlier.iter().find(|program| program.hash == hash);
+        let Some(program) = versions.of(hash).or_else(earlier) else {
             return;
         };
         let outputs = scan(&program.executable, &mut self.scratch, &mut bits, &step.inputs);
@@ -57,7 +58,7 @@ impl Referee {
     pub(super) fn taken_from(&self, place: usize, step: &Step) -> Option<(ProgramHash, Image)> {
         let State { program: before, bits, .. } = &self.states[place];
         let hash = step.change.unwrap_or(*before);
-        let program = self.versions().of(hash)?;
+        let program = self.program_with(hash)?;
         if hash == *before {
             return Some((hash, bits.clone()));
         }

@@ -1,6 +1,6 @@
 //! A referee that never blows its whistle proves nothing: every kind of violation is shown to it.
 
-use understudy_cycle::{Agreement, FallbackChange, Mode, Schedule};
+use understudy_cycle::{Agreement, Conversion, FallbackChange, Mode, ProgramChange, Schedule};
 use understudy_logic::CircuitBuilder;
 use understudy_remote_io::{Fallback, PointPlace, Ramp, Release, StaleState, ValueFault};
 use understudy_typed::Elementary;
@@ -432,4 +432,49 @@ fn outputs_recorded_after_those_of_a_successor_are_judged_by_their_own_cycle() {
         assert_eq!(unknown.observe_from(author, Time(38), &event), Ok(()), "{event:?}");
         assert_eq!(unknown.gaps(), 1, "{event:?}");
     }
+}
+
+#[derive(Debug)]
+struct Unchanged;
+
+impl Conversion for Unchanged {
+    fn convert(&self, state: &[u64]) -> Vec<u64> {
+        state.to_vec()
+    }
+
+    fn release(&self, _: &mut [u64], _: &[u64]) {}
+}
+
+/// A change of other programs or settings leaves the program running that a change before it has brought, and its outputs are judged.
+#[test]
+fn a_program_is_judged_during_later_changes_of_others() {
+    let mut referee = referee();
+    let before = referee.program.clone();
+    let after = Program { hash: ProgramHash(6), executable: before.executable.clone() };
+    let way = Arc::new(Unchanged);
+    let change = |number: u64, programs| {
+        let [before, after] = [number, number + 1].map(ConfigurationHash);
+        Arc::new(OnlineChange { before, after, programs, fallbacks: Vec::new() })
+    };
+    let program =
+        ProgramChange { program: ProgramId(0), before, after, forward: way.clone(), back: way };
+    referee.learn(&change(1, vec![program]));
+    let mut lineage = Lineage::genesis(ProgramHash(5), moment(0));
+    let mut sample = |cycle, change| {
+        let (moment, born, inputs) = (moment(cycle), moment(0), bit(true));
+        let event =
+            Event::Sampled { moment, born, before: lineage, change, inputs: inputs.clone() };
+        lineage = lineage.after_step(&Step { change, inputs });
+        event
+    };
+    assert_eq!(referee.observe(&sample(1, None)), Ok(()));
+    assert_eq!(referee.observe(&sample(2, Some(ProgramHash(6)))), Ok(()));
+    for number in 2..2 + EARLIER_PROGRAMS as u64 {
+        referee.learn(&change(number, Vec::new()));
+        assert_eq!(referee.observe(&sample(1 + number, None)), Ok(()));
+        assert_eq!(referee.observe(&applied(1 + number, false, Source::Direct)), Ok(()));
+    }
+    assert_eq!(referee.gaps(), 0);
+    let wrong = referee.observe(&applied(99, true, Source::Direct));
+    assert!(wrong.is_err(), "{wrong:?}");
 }

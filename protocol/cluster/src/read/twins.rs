@@ -181,7 +181,7 @@ fn check_outputs(
             output.name, output.of
         );
         let found = Diagnostic::error("U0260", message, section.span.clone());
-        let help = match SharedOutputs::can_share(output.of) {
+        let help = match SharedOutputs::can_share(output.of) && output.values.is_none() {
             true => format!(
                 "add `share = {{ {} = \"half\" }}` where the currents of the two modules add up, or use wiring \"exclusive\"",
                 output.name
@@ -227,17 +227,30 @@ fn read_shares(
             refuse("U0209", message, span, help);
             continue;
         };
-        let has_offset = device.is_some_and(|device| {
-            let mut bindings = device.outputs.bindings.iter();
-            bindings.any(|it| it.name == *name && it.place.has_offset())
+        let binding = device.and_then(|device| {
+            device.outputs.bindings.iter().find(|binding| binding.name == *name)
         });
-        if !SharedOutputs::can_share(output.of) {
-            let message = format!("`{name}` is {}: only a number has a share", output.of);
+        let is_value = |range: (i128, i128)| range.0 <= 0 && 0 <= range.1;
+        if !SharedOutputs::can_share(output.of) || output.values.is_some() {
+            let declared = output.declared();
+            let message = format!("`{name}` is {declared}: only a number has a share");
             refuse("U0204", message, span, "remove it from `share`".to_owned());
         } else if how.value != "half" {
             let message = format!("`{}` is no share", how.value);
             refuse("U0207", message, &how.span, "write \"half\"".to_owned());
-        } else if has_offset {
+        } else if !output.range.is_none_or(is_value) {
+            let message = format!(
+                "`{name}` is {}, which does not contain 0: one module drives 0 where the other one drives the whole",
+                output.declared()
+            );
+            refuse("U0260", message, span, "use wiring \"exclusive\"".to_owned());
+        } else if binding.is_some_and(|binding| binding.place.rounds(output.of)) {
+            let message = format!(
+                "`{name}` is rounded to whole numbers in its registers, so two halves can be more than the whole"
+            );
+            let help = "let the program compute a whole number, and write it without a `scale`";
+            refuse("U0260", message, span, help.to_owned());
+        } else if binding.is_some_and(|binding| binding.place.has_offset()) {
             let message = format!(
                 "`{name}` has an `offset`, so two halves of it are not the current of the whole"
             );

@@ -192,6 +192,18 @@ fn numbers_that_two_modules_share() {
     let offset = "{ at = \"holding:0\", as = \"int\", offset = 4.0 }";
     let (_, found) = field(offset);
     assert!(found.contains("U0260") && found.contains("has an `offset`"), "{found}");
+    // Two halves that are rounded up are more than the whole.
+    let scaled = "{ at = \"holding:0\", as = \"int\", scale = 0.01 }";
+    let (_, found) = field(scaled);
+    assert!(found.contains("U0260") && found.contains("is rounded"), "{found}");
+    for (of, told) in
+        [("(Off, Auto, Man)", "U0204"), ("USINT (3..9) := 3", "U0260"), ("USINT (0..9)", "")]
+    {
+        let (_, found) = parallel(half, "", of);
+        let errors: Vec<&str> = found.lines().filter(|line| line.contains("error")).collect();
+        let as_told = if told.is_empty() { errors.is_empty() } else { found.contains(told) };
+        assert!(as_told, "{of}: {found}");
+    }
     let keys = "name = \"tank-io-2\", wiring = \"exclusive\", share = { pump = \"half\" }";
     let text = format!("{CELL}[[remote_io]]\ncontroller = \"tank\"\ntwin = {{ {keys} }}\n");
     let found = findings(&load(&text, &[("tank.st", &tank("INT"))]).reports);
