@@ -30,10 +30,10 @@ const FIELD: &str =
 /// What is written as it is declared.
 const CALENDAR: &str = "
 PROGRAM calendar
-  VAR_INPUT day : DATE; at : TIME_OF_DAY; END_VAR
+  VAR_INPUT day : DATE; clock : TIME_OF_DAY; END_VAR
   VAR_OUTPUT leap : BOOL; afternoon : BOOL; END_VAR
   leap := day = D#2024-02-29;
-  afternoon := at >= TOD#12:00:00;
+  afternoon := clock >= TOD#12:00:00;
 END_PROGRAM";
 
 fn model(program: &str, asked: &Properties) -> Model {
@@ -88,8 +88,8 @@ fn dates_and_times_of_day_are_compared_as_they_are_written() {
     for (property, holds) in [
         ("never leap and day > D#2024-02-29", true),
         ("never leap and day < D#2024-03-01", false),
-        ("afternoon only while at >= TOD#12:00:00", true),
-        ("afternoon only while at > TOD#12:00:00", false),
+        ("afternoon only while clock >= TOD#12:00:00", true),
+        ("afternoon only while clock > TOD#12:00:00", false),
     ] {
         assert_eq!(verdict(CALENDAR, &none, property), Some(holds), "{property}");
     }
