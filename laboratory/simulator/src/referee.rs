@@ -23,6 +23,7 @@
 mod descent;
 mod fallbacks;
 mod pair;
+mod programs;
 mod steps;
 mod unrecorded;
 mod violation;
@@ -31,21 +32,20 @@ use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use understudy_cycle::{OnlineChange, Program, Versions};
+use understudy_cycle::{OnlineChange, Program};
 use understudy_executable::{Executable, Scratch};
 use understudy_remote_io::{Event, Settings};
-use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, ProgramId, Source, Step};
+use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, Source, Step};
 
 use descent::Descent;
 use fallbacks::Fallbacks;
 use pair::Pair;
+use programs::Programs;
 use unrecorded::Unrecorded;
 pub use violation::Violation;
 
 /// States that are remembered, at most, where some of them lie before the floor; the oldest are forgotten.
 const REMEMBERED: usize = 1024;
-/// Programs of changes that are over, which are known at most.
-const EARLIER_PROGRAMS: usize = 64;
 /// States that are remembered from the floor on: for ten minutes of 10 ms cycles of which nothing is applied. The floor is never forgotten.
 const REMEMBERED_FROM_FLOOR: usize = 65_536;
 
@@ -58,12 +58,7 @@ const CHOICE_SAMPLES: u32 = 256;
 /// Checks one remote I/O.
 #[derive(Debug, Clone)]
 pub struct Referee {
-    program: Program,
-    /// The online change that its program may go through.
-    change: Option<Arc<OnlineChange>>,
-    /// Its programs in changes before that one, the newest last.
-    earlier: Vec<Program>,
-    place: ProgramId,
+    programs: Programs,
     fallbacks: Fallbacks,
     scratch: Scratch,
     /// The states that the samples led to, newest last.
@@ -120,10 +115,7 @@ impl Referee {
     /// For the remote I/O of these settings, whose program is `executable`.
     pub fn new(settings: &Settings, executable: Executable) -> Self {
         Self {
-            program: Program { hash: settings.hash, executable },
-            change: None,
-            earlier: Vec::new(),
-            place: settings.program,
+            programs: Programs::new(settings.program, Program { hash: settings.hash, executable }),
             fallbacks: Fallbacks::new(settings.agreement.configuration, settings.fallback.clone()),
             scratch: Scratch::default(),
             states: VecDeque::new(),
@@ -148,25 +140,20 @@ impl Referee {
     /// Judges the program across this change too.
     #[must_use]
     pub fn with_change(mut self, change: Option<&Arc<OnlineChange>>) -> Self {
-        self.change = change.cloned();
+        change.into_iter().for_each(|change| self.learn(change));
         self
     }
 
-    /// From now on the program may change by this. The programs of changes before it stay known: one of them runs on where this change is of others.
+    /// From now on the program may change by this. The programs of changes before it stay known.
     pub fn learn(&mut self, change: &Arc<OnlineChange>) {
-        let last = self.change.replace(Arc::clone(change));
-        let of_program = last.as_ref().and_then(|last| last.of(self.place));
-        for program in of_program.into_iter().flat_map(|last| [&last.before, &last.after]) {
-            self.earlier.retain(|known| known.hash != program.hash);
-            self.earlier.push(program.clone());
-        }
-        let more = self.earlier.len().saturating_sub(EARLIER_PROGRAMS);
-        self.earlier.drain(..more);
+        self.programs.learn(change);
     }
 
     /// The program that takes a step from the state of a lineage, and its state before the step, where they are known.
     pub fn taken(&self, before: Lineage, step: &Step) -> Option<(ProgramHash, Image)> {
-        self.taken_from(self.place_of(before)?, step)
+        let State { program, bits, .. } = &self.states[self.place_of(before)?];
+        let (program, bits) = self.programs.taken((*program, bits), step)?;
+        Some((program.hash, bits))
     }
 
     /// The program of the state of a lineage, where it is remembered.
@@ -176,18 +163,9 @@ impl Referee {
 
     /// Whether a state is the one in which a program begins that is started cold.
     pub fn is_initial(&self, program: ProgramHash, state: &Image) -> bool {
-        self.program_with(program).is_some_and(|it| {
+        self.programs.of(program).is_some_and(|it| {
             it.executable.state_count() == state.width() && it.executable.initial() == state.words()
         })
-    }
-
-    /// The program with this hash, of this change or one before it.
-    fn program_with(&self, hash: ProgramHash) -> Option<&Program> {
-        self.versions().of(hash).or_else(|| self.earlier.iter().find(|it| it.hash == hash))
-    }
-
-    fn versions(&self) -> Versions<'_> {
-        Versions::new(&self.program, self.change.as_ref(), self.place)
     }
 
     /// What the plant shows, as it says itself.
@@ -312,9 +290,9 @@ impl Referee {
     /// The reference run goes on from a state that is known from elsewhere, for want of a start that was seen: of the program with a hash, or of the
     /// first one. A program that is not known here says nothing.
     pub fn goes_on_from(&mut self, (of, lineage): (Option<ProgramHash>, Lineage), bits: Image) {
-        let hash = of.unwrap_or(self.program.hash);
+        let hash = of.unwrap_or(self.programs.first.hash);
         let fits = |program: &Program| program.executable.state_count() == bits.width();
-        if !self.program_with(hash).is_some_and(fits) {
+        if !self.programs.of(hash).is_some_and(fits) {
             return;
         }
         self.truth = None;
@@ -370,9 +348,8 @@ impl Referee {
                 Err(Violation::WentBack { moment, from, applied })
             };
         }
-        let all = self.versions().all().chain(&self.earlier);
-        let started = { all }.find(|it| before == Lineage::genesis(it.hash, born)).cloned();
-        if let Some(Program { hash, executable }) = started {
+        let started = self.programs.all().find(|it| before == Lineage::genesis(it.hash, born));
+        if let Some(Program { hash, executable }) = started.cloned() {
             self.choice = 0;
             self.cold_starts += 1;
             self.applied = false;
@@ -415,7 +392,7 @@ impl Referee {
         let chosen = std::mem::take(&mut self.choice) > 0;
         let state = &self.states[from];
         let (stepped, applied) = (state.stepped, self.states[self.floor].stepped);
-        let program = self.program_with(state.program).unwrap_or(&self.program).clone();
+        let program = self.programs.of(state.program).unwrap_or(&self.programs.first).clone();
         let bits = program.executable.restarted(state.bits.words());
         let bits = Image::from_words(program.executable.state_count(), &bits);
         let bits = bits.expect("a state of this program is packed");

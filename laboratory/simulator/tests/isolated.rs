@@ -5,15 +5,7 @@ mod press_cell;
 
 use understudy_cycle::Mode;
 use understudy_simulator::{Action, Fault, Network, Simulation};
-use understudy_wire::{Member, ProgramId, StationId};
-
-const MEMBERS: [Member; 5] = [
-    Member::Station(StationId(0)),
-    Member::Station(StationId(1)),
-    Member::Station(StationId(2)),
-    Member::RemoteIo(ProgramId(0)),
-    Member::RemoteIo(ProgramId(1)),
-];
+use understudy_wire::Member;
 
 /// When something happens: a cycle, and the part of it that has passed.
 type At = (u64, f64);
@@ -41,7 +33,7 @@ impl Cell {
     }
 
     fn isolate(&mut self, from: At, until: At, member: Member) {
-        for other in MEMBERS.into_iter().filter(|other| *other != member) {
+        for other in press_cell::MEMBERS.into_iter().filter(|other| *other != member) {
             self.cut(from, until, member, other);
         }
     }
@@ -60,9 +52,9 @@ impl Cell {
 /// Program, one of its stations, and the other one.
 fn holders() -> impl Iterator<Item = (Member, Member, Member)> {
     [0, 1].into_iter().flat_map(|program| {
-        let own = MEMBERS[program];
-        let remote_io = MEMBERS[3 + program];
-        [(remote_io, own, MEMBERS[2]), (remote_io, MEMBERS[2], own)]
+        let own = press_cell::MEMBERS[program];
+        let remote_io = press_cell::MEMBERS[3 + program];
+        [(remote_io, own, press_cell::MEMBERS[2]), (remote_io, press_cell::MEMBERS[2], own)]
     })
 }
 

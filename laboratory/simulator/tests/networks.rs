@@ -9,15 +9,7 @@ use std::time::Duration;
 
 use understudy_cycle::Mode;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, Tally};
-use understudy_wire::{Member, ProgramId, StationId, Time, Via};
-
-const MEMBERS: [Member; 5] = [
-    Member::Station(StationId(0)),
-    Member::Station(StationId(1)),
-    Member::Station(StationId(2)),
-    Member::RemoteIo(ProgramId(0)),
-    Member::RemoteIo(ProgramId(1)),
-];
+use understudy_wire::{Member, Time, Via};
 
 /// Cycles from one change of a flapping network to the next: 50 ms.
 const FLAP_CYCLES: u64 = 5;
@@ -80,7 +72,7 @@ fn one_of_two_networks_that_is_down_or_flaps_costs_no_cycle() {
             let action = if flaps && change % 2 == 1 { up } else { down };
             let (at_cycle, phase) = (change * FLAP_CYCLES, (change % 10) as f64 / 10.0);
             if flaps || change == 0 {
-                for member in MEMBERS {
+                for member in press_cell::MEMBERS {
                     simulation.schedule(Fault { at_cycle, phase, member, action });
                 }
             }

@@ -164,9 +164,9 @@ fn two_failures_never_add_up_to_more_than_the_whole() {
     }
 }
 
-/// The two do not receive each other, and the stations receive both: they follow the author, so nobody is asked who that is.
+/// The two do not receive each other, and the stations receive both: they follow the author, so the operator is not asked who that is.
 #[test]
-fn a_cut_between_the_two_asks_nobody() {
+fn a_cut_between_the_two_is_no_question() {
     for after in 1..=3 {
         let cuts = [(FIRST, TWIN), (TWIN, FIRST)];
         let cuts = cuts.map(|(member, to)| fault(100, 0.4, member, Action::Cut { to }));

@@ -43,8 +43,8 @@ impl Referee {
         let fallbacks = &mut self.fallbacks;
         fallbacks.told.retain(|(of, _)| *of != member);
         let speaker = fallbacks.speaker.replace(member);
-        if self.change.as_ref().is_some_and(|change| change.name().has(own)) {
-            fallbacks.runs(own, self.change.as_deref(), self.place);
+        if self.programs.change.as_ref().is_some_and(|change| change.name().has(own)) {
+            fallbacks.runs(own, self.programs.change.as_deref(), self.programs.place);
         }
         fallbacks.speaker = speaker;
     }
@@ -56,27 +56,29 @@ impl Referee {
 
     /// The remote I/O runs this configuration from now on, with its settings: ramps to other fail-safe values begin where the outputs are.
     pub(super) fn configured(&mut self, own: ConfigurationHash) {
-        if self.fallbacks.runs(own, self.change.as_deref(), self.place) {
+        if self.fallbacks.runs(own, self.programs.change.as_deref(), self.programs.place) {
             self.descent.begins_anew();
         }
     }
 
     /// Whether outputs may still be held.
     pub(super) fn may_hold(&self) -> bool {
-        let possible = self.fallbacks.possible(self.change.as_deref(), self.place);
+        let possible =
+            self.fallbacks.possible(self.programs.change.as_deref(), self.programs.place);
         possible.is_none_or(|all| all.iter().any(|fallback| self.held <= fallback.hold_cycles))
     }
 
     /// Whether outputs may be driven as fail-safe.
     pub(super) fn may_fall_back_to(&self, driven: &Image) -> bool {
-        let possible = self.fallbacks.possible(self.change.as_deref(), self.place);
+        let possible =
+            self.fallbacks.possible(self.programs.change.as_deref(), self.programs.place);
         possible.is_none_or(|all| all.iter().any(|it| self.descent.permits(driven, it)))
     }
 
     /// Whether the values on the way to the fail-safe ones count; without ramps there is one way to them.
     pub fn has_ramps(&self) -> bool {
-        let changed = self.change.iter().flat_map(|change| &change.fallbacks);
-        let mut changed = changed.filter(|changed| changed.program == self.place);
+        let changed = self.programs.change.iter().flat_map(|change| &change.fallbacks);
+        let mut changed = changed.filter(|changed| changed.program == self.programs.place);
         let has = |fallback: &Fallback| !fallback.ramps.is_empty();
         let current = self.fallbacks.in_force().fallback.as_ref();
         current.is_some_and(has) || changed.any(|it| has(&it.before) || has(&it.after))

@@ -8,7 +8,6 @@
 
 use std::collections::VecDeque;
 
-use understudy_cycle::Versions;
 use understudy_remote_io::Event;
 use understudy_wire::{Image, Lineage, Member, Moment, Source, Step, Time};
 
@@ -145,9 +144,7 @@ impl Referee {
             .rev()
             .find(|state| state.program == program && state.lineage.after(inputs) == lineage)?;
         let mut bits = before.bits.clone();
-        let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
-        let earlier = || self.earlier.iter().find(|it| it.hash == program);
-        let executable = &versions.of(program).or_else(earlier)?.executable;
+        let executable = &self.programs.of(program)?.executable;
         Some(scan(executable, &mut self.scratch, &mut bits, inputs))
     }
 

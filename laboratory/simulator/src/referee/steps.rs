@@ -1,6 +1,5 @@
 //! The steps of the reference run, across change marks, and those of samples that have no record.
 
-use understudy_cycle::Versions;
 use understudy_executable::{Executable, Scratch};
 use understudy_wire::{Image, Lineage, Moment, ProgramHash, Step};
 
@@ -15,7 +14,7 @@ impl Referee {
         for place in newest {
             let state = &self.states[place];
             from.push((place, None, state.lineage));
-            let others = self.versions().all().map(|program| program.hash);
+            let others = self.programs.versions().all().map(|program| program.hash);
             let others = others.filter(|hash| *hash != state.program);
             from.extend(others.map(|to| (place, Some(to), state.lineage.changed(to))));
         }
@@ -38,33 +37,17 @@ impl Referee {
         let Some(place) = self.newest else {
             return;
         };
-        let lineage = self.states[place].lineage;
-        let Some((hash, mut bits)) = self.taken_from(place, step) else {
+        let State { lineage, program: before, bits, .. } = &self.states[place];
+        let lineage = *lineage;
+        let Some((program, mut bits)) = self.programs.taken((*before, bits), step) else {
             // A program that is not known here: nothing after it is judged.
             self.gaps += 1;
             return self.misses_records();
         };
-        let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
-        let earlier = || self.earlier.iter().find(|program| program.hash == hash);
-        let Some(program) = versions.of(hash).or_else(earlier) else {
-            return;
-        };
+        let hash = program.hash;
         let outputs = scan(&program.executable, &mut self.scratch, &mut bits, &step.inputs);
         self.remember(moment, (hash, lineage.after_step(step)), bits);
         self.truth = Some((moment, outputs));
-    }
-
-    /// The program that takes a step from the state at a place, and its state before the step; none where a change leads to a program that is not known.
-    pub(super) fn taken_from(&self, place: usize, step: &Step) -> Option<(ProgramHash, Image)> {
-        let State { program: before, bits, .. } = &self.states[place];
-        let hash = step.change.unwrap_or(*before);
-        let program = self.program_with(hash)?;
-        if hash == *before {
-            return Some((hash, bits.clone()));
-        }
-        let inputs = step.inputs.words();
-        let converted = self.versions().convert((*before, hash), bits.words(), inputs)?;
-        Some((hash, Image::from_words(program.executable.state_count(), &converted).ok()?))
     }
 }
 

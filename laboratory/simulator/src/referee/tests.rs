@@ -449,7 +449,7 @@ impl Conversion for Unchanged {
 #[test]
 fn a_program_is_judged_during_later_changes_of_others() {
     let mut referee = referee();
-    let before = referee.program.clone();
+    let before = referee.programs.first.clone();
     let after = Program { hash: ProgramHash(6), executable: before.executable.clone() };
     let way = Arc::new(Unchanged);
     let change = |number: u64, programs| {
@@ -469,7 +469,7 @@ fn a_program_is_judged_during_later_changes_of_others() {
     };
     assert_eq!(referee.observe(&sample(1, None)), Ok(()));
     assert_eq!(referee.observe(&sample(2, Some(ProgramHash(6)))), Ok(()));
-    for number in 2..2 + EARLIER_PROGRAMS as u64 {
+    for number in 2..2 + programs::EARLIER_PROGRAMS as u64 {
         referee.learn(&change(number, Vec::new()));
         assert_eq!(referee.observe(&sample(1 + number, None)), Ok(()));
         assert_eq!(referee.observe(&applied(1 + number, false, Source::Direct)), Ok(()));

@@ -2,7 +2,7 @@
 
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_remote_io::{Event, PairSettings, RemoteIo, Settings};
-use understudy_wire::{Image, Member, Part, ProgramId, ProgramSet, StateChoice};
+use understudy_wire::{Image, Member, Moment, Part, ProgramId, ProgramSet, StateChoice};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
@@ -124,8 +124,7 @@ impl Simulation {
         observe: &mut Observe<'_>,
     ) {
         let (actuators, wrong) = self.modules[program.index()].follow(self.now, member, outputs);
-        let moment = self.referees[program.index()].truth().map(|(moment, _)| moment);
-        let moment = moment.unwrap_or_default();
+        let moment = self.newest_sample(program);
         let violation = wrong.map(|wrong| match wrong {
             Wrong::NotOfAuthor => Violation::NotFollowed { moment, driven: outputs.clone() },
             Wrong::TooMuch => Violation::TooMuch { moment },
@@ -142,8 +141,13 @@ impl Simulation {
     /// Takes an event of a remote I/O: whether the modules of both drive more than it has decided.
     pub(super) fn judge_sum(&mut self, program: ProgramId, event: &Event) -> Option<Violation> {
         let is_too_much = self.modules[program.index()].decided(self.now, event.driven()?);
-        let moment = self.referees[program.index()].truth().map(|(moment, _)| moment);
-        is_too_much.then(|| Violation::TooMuch { moment: moment.unwrap_or_default() })
+        is_too_much.then(|| Violation::TooMuch { moment: self.newest_sample(program) })
+    }
+
+    /// The cycle of the newest sample of a program that was judged.
+    fn newest_sample(&self, program: ProgramId) -> Moment {
+        let truth = self.referees[program.index()].truth();
+        truth.map(|(moment, _)| moment).unwrap_or_default()
     }
 
     /// An input module of one of two remote I/Os shows a fixed value of an input from now on; the true one again with `None`.

@@ -6,10 +6,20 @@ use std::time::Duration;
 use understudy_cycle::Mode;
 use understudy_remote_io::{PairSettings, PairedInput, Wiring};
 use understudy_simulator::Parts;
+use understudy_wire::{Member, ProgramId, StationId};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 pub(crate) const HOLD_CYCLES: u32 = 3;
 pub(crate) const DISCREPANCY_CYCLES: u32 = 10;
+
+/// The robot, the press, their understudy, and the remote I/Os of both programs.
+pub(crate) const MEMBERS: [Member; 5] = [
+    Member::Station(StationId(0)),
+    Member::Station(StationId(1)),
+    Member::Station(StationId(2)),
+    Member::RemoteIo(ProgramId(0)),
+    Member::RemoteIo(ProgramId(1)),
+];
 
 /// A robot and its press.
 pub(crate) fn parts(mode: Mode, understudies: usize) -> Parts {
