@@ -18,16 +18,17 @@ pub(crate) fn is_understudy() -> bool {
     std::env::args_os().next().is_some_and(|name| name == Path::new(NAME))
 }
 
+/// This program again.
+pub(crate) fn own_command() -> io::Result<Command> {
+    std::env::current_exe().map(Command::new)
+}
+
 /// The `understudy` command of this build: what is measured is never another version of the project than what judges it.
 pub(crate) fn understudy_command() -> Result<Command, Answer> {
-    let program = std::env::current_exe().map_err(|error| {
-        Answer::failed(
-            Status::Failed,
-            "U0604",
-            format!("cannot find the executable of this program: {error}"),
-        )
+    let mut command = own_command().map_err(|error| {
+        let message = format!("cannot find the executable of this program: {error}");
+        Answer::failed(Status::Failed, "U0604", message)
     })?;
-    let mut command = Command::new(program);
     command.arg0(NAME);
     Ok(command)
 }

@@ -258,7 +258,7 @@ struct Row {
     unrecorded: u64,
     /// Reports that the input modules of a program differ, which they do not.
     input_alarms: u64,
-    /// Questions to the operator, who does not answer here: the program stands still from then on.
+    /// Questions to the operator, who does not answer here: the program is not executed from then on.
     questions: u64,
     /// Longest time without a write to the devices of a program, in periods.
     longest_gap_cycles: f64,
@@ -483,7 +483,7 @@ fn answer(rows: &[Row]) -> Answer {
             let _ = writeln!(text, "    {violation}");
         }
     }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\na program of which a question is asked stands still until the end of its row;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
+    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\na program of which a question is asked is not executed until the end of its row;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
     let is_right =
         |row: &Row| (row.wrong, row.by_two, row.unproved, row.input_alarms) == (0, 0, 0, 0);
     let passed = rows.iter().all(is_right);

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, BufReader};
 use std::net::UdpSocket;
-use std::process::{ChildStdout, Command, Stdio};
+use std::process::{ChildStdout, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ use understudy_bus::{
 };
 use understudy_wire::{ClusterHash, ConfigurationHash, Member, ProgramId, Roster, StationId};
 
-use crate::children::{Running, guard, refused};
+use crate::children::{Running, guard, own_command, refused};
 
 use super::meter::{Exchange, Meter};
 use super::pattern::{PROGRAMS, Pattern, STATIONS};
@@ -71,13 +71,12 @@ fn failed(reason: &str) -> Answer {
 
 /// Measures one carrier.
 pub(super) fn measure(carrier: Carrier, settings: Settings) -> Result<Exchange, Answer> {
-    let program = std::env::current_exe().map_err(refused("to find this program"))?;
     let members = members().map_err(refused("seven free ports"))?;
     let mut running = Running(Vec::new());
     // The cycle master is the last to start.
     for own in members.iter().rev().map(|peer| peer.member) {
         let part = Part { own, members: members.clone(), carrier, settings };
-        let mut command = Command::new(&program);
+        let mut command = own_command().map_err(refused("to find this program"))?;
         command.arg("member");
         command.arg(serde_json::to_string(&part).unwrap_or_default());
         if std::env::var_os(zenoh_runtime(false).0).is_none() {

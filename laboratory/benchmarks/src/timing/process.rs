@@ -1,7 +1,7 @@
 //! One cluster on processes of this machine, each of which measures its member for a short time.
 
 use std::io::{self, BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -21,7 +21,7 @@ use understudy_remote_io::RemoteIo;
 use understudy_wire::{Epoch, Member, Moment, ProgramId, StationId, Time};
 
 use super::observed::{Measured, Observed, Window, stations_of_understudy};
-use crate::children::{Running, guard, refused};
+use crate::children::{Running, guard, own_command, refused};
 
 /// From the start of the processes to their windows.
 const SETTLING: Duration = Duration::from_secs(1);
@@ -109,7 +109,6 @@ fn processor_seconds() -> f64 {
 
 /// Runs one cluster.
 pub(super) fn measure(case: Case) -> Result<Together, Answer> {
-    let program = std::env::current_exe().map_err(refused("to find this program"))?;
     let peers = peers(case.controllers).map_err(refused("free ports"))?;
     let (used, began) = (processor_seconds(), Instant::now());
     let mut running = Running(Vec::new());
@@ -117,7 +116,7 @@ pub(super) fn measure(case: Case) -> Result<Together, Answer> {
     let mut readers = Vec::new();
     for own in peers.iter().map(|peer| peer.member) {
         let part = Part { case, own, peers: peers.clone() };
-        let mut command = Command::new(&program);
+        let mut command = own_command().map_err(refused("to find this program"))?;
         command.arg("timed").arg(serde_json::to_string(&part).unwrap_or_default());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut child = command.spawn().map_err(refused("to start a process of the benchmark"))?;
