@@ -81,7 +81,7 @@ impl ChangePlace {
     const ALL: [Self; 5] =
         [Self::NotLoaded, Self::Prepared, Self::Accepted, Self::Ended, Self::NotKnown];
 
-    /// In words.
+    /// The place in words.
     pub const fn word(self) -> &'static str {
         match self {
             Self::NotLoaded => "not loaded",
@@ -232,7 +232,7 @@ impl Model {
 }
 
 impl ChangeSnapshot {
-    /// In a sentence.
+    /// The change, its steps and the places of its members in a sentence.
     pub fn text(&self) -> String {
         let mut parts = Vec::new();
         if let Some(GivenStep { by, step, cycle }) = &self.given {

@@ -43,13 +43,13 @@ impl Version {
         &self.controller
     }
 
-    /// Of a ladder.
+    /// The observer of its power flow; none where it is no ladder.
     pub(crate) fn observer(&self, period: Duration) -> Option<&Observer> {
         let observer = || Observer::new(self.controller.ladder()?, period).ok();
         self.observer.get_or_init(observer).as_ref()
     }
 
-    /// Of a program with statements.
+    /// The interpreter of its statements; none where it has no text.
     pub(crate) fn interpreter(&self) -> Option<&Interpreter> {
         let code = &self.controller.code;
         let interpreter = || code.source_text().map(|_| Interpreter::new(code.typed()));

@@ -38,7 +38,7 @@ pub struct OnlineChanges {
 const MOST_CONFIGURATIONS: usize = 32;
 
 impl OnlineChanges {
-    /// Of a run that begins with this cluster.
+    /// The configurations of a run that begins with this cluster.
     pub fn of(cluster: Arc<Cluster>) -> Self {
         Self { clusters: vec![cluster] }
     }

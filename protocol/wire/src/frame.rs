@@ -385,7 +385,7 @@ pub enum Modules {
     Author {
         /// Outputs that the modules of the other one drive from the deadline of this cycle on; `None` in any other frame than the one of a deadline.
         outputs: Option<Image>,
-        /// What these outputs are of the numbers that the modules of both drive together; the whole where there are none.
+        /// What these outputs are of the numbers that the modules of both drive together; the whole without such numbers.
         share: Share,
         /// [`Pair::sent`] of the newest frame of the other one: the outputs were sent later.
         answers: Option<Time>,

@@ -45,7 +45,7 @@ pub(super) fn diagnostic(named: &Named, (message, help): &(String, String)) -> D
     Diagnostic::error("U0435", message.clone(), named.span.clone()).with_help(help.clone())
 }
 
-/// The type of the number of this name; nothing where there is none.
+/// The type of the number of this name, if there is one.
 pub(super) fn type_of(system: &System, name: &str) -> Option<Elementary> {
     let inputs = system.inputs.iter().map(|input| (&input.name, input.of));
     let shown = system.shown.iter().map(|(name, term)| (name, system.terms.of(*term)));

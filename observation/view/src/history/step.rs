@@ -53,7 +53,7 @@ pub struct Driven {
 /// One cycle of one program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
-    /// From the origin of the run.
+    /// The cycle, counted from the origin of the run.
     pub cycle: i64,
     /// As the cluster counts it.
     pub moment: Moment,

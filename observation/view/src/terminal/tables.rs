@@ -124,7 +124,7 @@ fn last_sources(model: &Model, program: ProgramId, cycle: Option<i64>) -> String
     (last.saturating_sub(LAST - 1)..=last).map(letter).collect()
 }
 
-/// Programs whose state is lost or that are not protected, a line each; one line where there is none. And the online change in progress.
+/// Programs whose state is lost or that are not protected, a line each; one line if there is no such program. And the online change in progress.
 pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
     let alarm = Style::new().fg(BAD).add_modifier(Modifier::BOLD);
     let programs = snapshot.programs.iter();

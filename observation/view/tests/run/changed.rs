@@ -163,7 +163,7 @@ fn every_scan_is_explained_by_the_program_that_took_it() {
         assert_eq!((lines.len(), error.is_none()), (if is_new { 10 } else { 9 }, true), "{cycle}");
         let trace = model.trace(COUNTER, cycle).expect("its scan");
         assert_eq!(trace.fault, None);
-        // `begun` is set in the third scan, and nobody but the change knows of it afterwards.
+        // `begun` is set in the third scan, and only the change knows of it afterwards.
         let why = model.why("on", Some(cycle)).expect("it is explained");
         let reason = why.because.expect("a statement");
         let begun = reasons(&reason).into_iter().find(|(signal, ..)| signal == "begun");
@@ -289,7 +289,7 @@ fn a_state_that_is_told_after_the_acceptance_is_one_of_the_new_program() {
     }
 }
 
-/// Whoever reads the end of a long journal alone knows the program that runs.
+/// A view that reads only the end of a long journal knows the program that runs.
 #[test]
 fn the_program_that_runs_is_known_from_the_middle_of_a_journal() {
     let (cluster, records) = records("counter.st", [BEFORE, AFTER], &faults(60, None));

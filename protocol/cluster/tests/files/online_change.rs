@@ -410,7 +410,7 @@ fn values_of_points_keep_their_numbers() {
     }
 }
 
-/// Whoever reads a journal from its middle has the newest changes alone, each in the order in which it was loaded last. The programs of all are known.
+/// A view that reads a journal from its middle has only the newest changes, each in the order in which it was loaded last. The programs of all are known.
 #[test]
 fn changes_of_a_run_are_loaded_from_every_configuration_that_is_known() {
     let numbered = |seconds: usize| {

@@ -33,7 +33,7 @@ pub(super) struct Modules {
     theirs: Option<Readings>,
     /// Outputs that the other one drives, as this author has decided, until they are sent.
     driven: Option<(Image, Share)>,
-    /// The parts of shared numbers; none where there are none.
+    /// The parts of shared numbers, where the program has such.
     sharing: Option<Sharing>,
     /// Outputs that this follower drives.
     followed: Option<Followed>,

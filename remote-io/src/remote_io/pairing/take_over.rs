@@ -101,7 +101,7 @@ impl RemoteIo {
             }
             (true, true) => pairing.refused = 0,
             (false, _) => {
-                // One that follows the author needs nobody to decide who that is.
+                // Where a station follows the author, no decision is needed who that is.
                 let is_followed = pairing.reports.iter().any(|it| it.lacks == Some(false));
                 let more = pairing.refused.saturating_add(u32::from(receives));
                 pairing.refused = if is_followed { 0 } else { more };
