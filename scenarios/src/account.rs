@@ -403,7 +403,7 @@ impl Account {
 
     fn unwritten(&mut self, member: Member, records: u64) {
         *self.unwritten.entry(member).or_default() += records;
-        if let Member::RemoteIo(program) = member
+        if let Some(program) = member.sampled_program()
             && let Some(referee) = self.terms.referees.get_mut(program.index())
         {
             referee.misses_records();

@@ -431,6 +431,15 @@ impl Alarms {
         }
     }
 
+    /// Lasting alarms that one member raised are those of another one from now on, which ends them. Each keeps the name of the member that raised it.
+    pub(crate) fn pass_on(&mut self, [from, to]: [&str; 2], alarms: &[&'static str]) {
+        for &alarm in alarms {
+            if let Some(number) = self.lasting.remove(&(from.to_owned(), alarm)) {
+                self.lasting.insert((to.to_owned(), alarm), number);
+            }
+        }
+    }
+
     pub(crate) fn shift(&mut self, by: i64) {
         for alarm in self.alarms.values_mut() {
             alarm.cycle = alarm.cycle.saturating_add(by);

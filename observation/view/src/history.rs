@@ -379,6 +379,7 @@ impl History {
             }
             Event::Applied { moment, outputs, source, word_of, missing, heard, .. } => {
                 let driven = Driven {
+                    by: member,
                     outputs: event.driven().unwrap_or(outputs).clone(),
                     unforced: outputs.clone(),
                     source: *source,

@@ -241,10 +241,8 @@ impl Listing {
 
     /// Whether the outputs of a program come from elsewhere than at the deadline before.
     fn source_changed(&mut self, record: &Record) -> bool {
-        let (
-            Some(Member::RemoteIo(program)),
-            Happening::RemoteIo(RemoteIoEvent::Applied { source, .. }),
-        ) = (record.member, &record.event)
+        let (Some(program), Happening::RemoteIo(RemoteIoEvent::Applied { source, .. })) =
+            (record.member.and_then(Member::sampled_program), &record.event)
         else {
             return false;
         };
@@ -252,10 +250,10 @@ impl Listing {
     }
 
     fn cycle_of(&mut self, record: &Record) -> i64 {
-        match (&record.event, record.member) {
+        match (&record.event, record.member.and_then(Member::sampled_program)) {
             (
                 Happening::RemoteIo(RemoteIoEvent::Applied { moment, missing, .. }),
-                Some(Member::RemoteIo(program)),
+                Some(program),
             ) => {
                 let idle = *missing == Some(Missing::NoCycle);
                 self.cycles.deadline(program, *moment, idle)

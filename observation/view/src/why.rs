@@ -35,7 +35,7 @@ pub struct Why {
     pub signal: String,
     /// Its program.
     pub program: String,
-    /// The remote I/O of its program; an output is driven by it.
+    /// The remote I/O of its program that drove in this cycle; an output is driven by it.
     pub remote_io: String,
     /// From the origin of the run.
     pub cycle: i64,
@@ -223,6 +223,7 @@ impl Model {
         let step = &history.steps()[place];
         let version = self.version_at(history, place)?;
         let controller = version.controller();
+        let drove = self.driver_at(program, step);
         let output = controller.interface.outputs.find(name);
         let decided = step.driven.as_ref().filter(|_| output.is_some());
         let source = decided.map(|driven| driven.source);
@@ -281,7 +282,7 @@ impl Model {
             at: None,
             signal: name.to_owned(),
             program: controller.name.clone(),
-            remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),
+            remote_io: self.members.name(drove).to_owned(),
             cycle: step.cycle,
             age_cycles: None,
             forced: self.why_forced(program, name, step.cycle, &value, unforced.as_ref()),

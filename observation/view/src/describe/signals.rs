@@ -81,17 +81,17 @@ impl Names<'_> {
 
     /// The image of all inputs of the reporting remote I/O.
     pub(super) fn inputs(&self, image: &Image) -> String {
-        match self.by {
-            Some(Member::RemoteIo(program)) => image_text(image, self.members.inputs(program)),
-            _ => image.to_string(),
+        match self.by.and_then(Member::sampled_program) {
+            Some(program) => image_text(image, self.members.inputs(program)),
+            None => image.to_string(),
         }
     }
 
     /// The image of all its outputs.
     pub(super) fn outputs(&self, image: &Image) -> String {
-        match self.by {
-            Some(Member::RemoteIo(program)) => image_text(image, self.members.outputs(program)),
-            _ => image.to_string(),
+        match self.by.and_then(Member::sampled_program) {
+            Some(program) => image_text(image, self.members.outputs(program)),
+            None => image.to_string(),
         }
     }
 

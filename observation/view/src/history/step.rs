@@ -2,7 +2,7 @@
 
 use understudy_remote_io::Missing;
 use understudy_typed::Fault;
-use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source, StationId, StationSet};
+use understudy_wire::{Image, Lineage, Member, Moment, ProgramHash, Source, StationId, StationSet};
 
 /// A sample and its effect on the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,6 +32,8 @@ pub struct Sampled {
 /// The outputs at a deadline.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Driven {
+    /// The remote I/O that drove them: the first one of the program or its twin.
+    pub by: Member,
     /// y(i) as the device gets it, with the forced values.
     pub outputs: Image,
     /// y(i) before forces.

@@ -119,9 +119,7 @@ impl Model {
     /// The cycle of the run that the cluster counts as `cycle`, as the newest deadlines of a remote I/O tell; nothing before the origin of the
     /// run is known.
     pub fn cycle_of(&self, remote_io: Member, cycle: u64) -> Option<i64> {
-        let Member::RemoteIo(program) = remote_io else {
-            return None;
-        };
+        let program = remote_io.sampled_program()?;
         if !self.cycles.has_origin() {
             return None;
         }

@@ -130,7 +130,7 @@ impl Counters {
     }
 
     fn remote_io(&mut self, member: Member, event: &RemoteIoEvent) {
-        let Member::RemoteIo(program) = member else {
+        let Some(program) = member.sampled_program() else {
             return;
         };
         match event {

@@ -7,8 +7,10 @@ use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_wire::{Member, Part, ProgramId};
 
 use super::Model;
+use super::programs::{FAIL_SAFE, FORCED};
 use super::standing::{Change, ProgramChange};
-use crate::describe::modules_text;
+use crate::describe::{CHANGE_TAKEN_BACK, PROGRAM_FAULT, modules_text};
+use crate::history::Step;
 
 /// Alarm of an author whose partner is not received.
 pub(super) const PARTNER_LOST: &str = "partner-lost";
@@ -16,10 +18,28 @@ pub(super) const PARTNER_LOST: &str = "partner-lost";
 /// Alarm of inputs whose two modules differ, or of which one is excluded.
 pub(super) const INPUT_MODULES: &str = "input-modules";
 
+/// Alarms of a program that its author raises and ends, whichever remote I/O that is.
+const OF_THE_AUTHOR: [&str; 6] =
+    [CHANGE_TAKEN_BACK, "configuration-disputed", "disputed", FAIL_SAFE, FORCED, PROGRAM_FAULT];
+
 impl Model {
     /// Whether a program has two remote I/Os.
     pub(super) fn is_paired(&self, program: ProgramId) -> bool {
         self.cluster.twins().contains(program)
+    }
+
+    /// The remote I/O that drove the outputs of a program at a step; where it reported no deadline, the one that was to drive them.
+    pub(crate) fn driver_at(&self, program: ProgramId, step: &Step) -> Member {
+        let driven = step.driven.as_ref();
+        driven.map_or_else(|| self.standing(step.cycle).driver(program), |driven| driven.by)
+    }
+
+    /// As [`Self::driver_at`], of a cycle.
+    pub(super) fn driver_in(&self, program: ProgramId, cycle: i64) -> Member {
+        match self.deadline(program, cycle) {
+            Some(step) => self.driver_at(program, step),
+            None => self.standing(cycle).driver(program),
+        }
     }
 
     /// The member as which it reports: both remote I/Os of a program report as one.
@@ -59,12 +79,12 @@ impl Model {
     ) {
         match event {
             RemoteIoEvent::PartChanged { part: Part::Author, .. } => {
-                let both = [member.partner(), Some(member)].into_iter().flatten();
-                let names: Vec<String> =
-                    both.map(|one| self.members.name(one).to_owned()).collect();
+                let before = member.partner().unwrap_or(member);
+                let names = [before, member].map(|one| self.members.name(one));
                 for name in names {
-                    self.alarms.all_over(&name, &[PARTNER_LOST, INPUT_MODULES], cycle);
+                    self.alarms.all_over(name, &[PARTNER_LOST, INPUT_MODULES], cycle);
                 }
+                self.alarms.pass_on(names, &OF_THE_AUTHOR);
                 self.changes.push(cycle, Change::Author(program, member));
                 // Records of the last samples of the other one may be missing.
                 if let Some(history) = self.histories.get_mut(program.index()) {

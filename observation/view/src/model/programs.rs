@@ -20,7 +20,7 @@ use crate::stop::{self, Stop};
 use crate::version::Version;
 
 /// The alarm of forced signals.
-const FORCED: &str = "forced";
+pub(super) const FORCED: &str = "forced";
 
 /// The alarm of a program that was started from its initial state because its state is lost.
 const STARTED_COLD: &str = "started-cold";

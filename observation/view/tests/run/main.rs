@@ -28,5 +28,6 @@ mod screen;
 mod state_signals;
 mod support;
 mod times;
+mod twins;
 mod why;
 mod writes;

@@ -89,9 +89,7 @@ impl AskedValue {
 
 /// The signal of a remote I/O that begins at a place.
 fn point_of(cluster: &Cluster, member: Member, signal: SignalPlace) -> Option<&Point> {
-    let Member::RemoteIo(program) = member else {
-        return None;
-    };
+    let program = member.sampled_program()?;
     let interface = &cluster.controllers().get(program.index())?.interface;
     let points = match signal {
         SignalPlace::Input(_) => &interface.inputs,
