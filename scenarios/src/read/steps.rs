@@ -320,14 +320,14 @@ impl Reader<'_> {
         let mut peers = Vec::new();
         for name in &names {
             match self.member(name) {
-                Some(peer @ (Member::Station(_) | Member::RemoteIo(_))) if Some(peer) != member => {
+                Some(peer) if Some(peer) != member && !matches!(peer, Member::Plant(_)) => {
                     peers.push(peer);
                 }
                 Some(_) => {
                     let message = format!("`{}` cannot receive from it", name.value);
                     self.diagnostics.push(
                         Diagnostic::error("U0309", message, name.span.clone())
-                            .with_help("another station or a remote I/O"),
+                            .with_help("another station, a remote I/O or its twin"),
                     );
                 }
                 None => {}
