@@ -5,6 +5,7 @@
 //! newest and when every remote I/O has told of a later one. The records of each member come on a way of their own, and a busy machine may
 //! read one of them long before another: only [`MAXIMUM_OPEN_CYCLES`], which bound its memory, end the wait for a remote I/O that is gone.
 
+mod absence;
 mod alarms;
 mod closing;
 mod events;
@@ -35,6 +36,7 @@ use understudy_wire::{
 use crate::figure::Signals;
 use crate::scenario::{During, Scenario};
 
+use absence::Absences;
 pub(crate) use alarms::AlarmFinding;
 use alarms::Alarms;
 use networks::Networks;
@@ -166,6 +168,7 @@ pub struct Account {
     /// Simulated plants that have not made a step yet: a process that still starts takes the processor from the cycles.
     starting_plants: ProgramSet,
     presences: Presences,
+    absences: Absences,
     pub(crate) outages: Outages,
     pub(crate) services: Vec<ServiceTrack>,
     stalls: Stalls,
@@ -213,6 +216,7 @@ impl Account {
             origin_rule,
             starting_plants: terms.plants,
             presences,
+            absences: Absences::default(),
             outages,
             services: vec![ServiceTrack::default(); programs],
             stalls: Stalls::default(),
@@ -307,6 +311,7 @@ impl Account {
     pub fn observe(&mut self, record: &Record) {
         self.records += 1;
         self.times.note(record);
+        self.absences.note(record);
         if let (Happening::Host(event), Some(member)) = (&record.event, record.member) {
             self.networks.note(member, event, self.next_cycle());
         }
@@ -410,13 +415,6 @@ impl Account {
             let changes = self.alarms.fold.forget(program);
             self.alarms_changed(&changes, None);
         }
-    }
-
-    /// How often a remote I/O that was killed took the records of its last samples with it, so that its outputs were not judged for a time.
-    pub(crate) fn gaps(&self) -> impl Iterator<Item = (ProgramId, u64)> {
-        let referees = self.terms.referees.iter().enumerate();
-        let gaps = referees.map(|(program, referee)| (ProgramId(program as u8), referee.gaps()));
-        gaps.filter(|(_, gaps)| *gaps > 0)
     }
 
     fn refuse(&mut self, member: Member, theirs: String, ours: String) {

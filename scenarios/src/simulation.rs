@@ -45,7 +45,7 @@ pub fn simulate(
         simulation.schedule(*fault);
     }
     // What a plant shows is told just before the deadline that drives it is.
-    let mut fields: Vec<Option<Field>> = vec![None; cluster.controllers().len()];
+    let mut fields: Vec<Option<(Image, Field)>> = vec![None; cluster.controllers().len()];
     let told = Cell::new(None);
     let mut take = |record: &Record, origin: Option<(Moment, u64)>| {
         journal(record);
@@ -69,9 +69,9 @@ pub fn simulate(
                 member,
                 asked: fault.at_cycle,
             }),
-            Simulated::Plant(field) => {
+            Simulated::Plant { outputs, field } => {
                 if let Member::Plant(program) = member {
-                    fields[program.index()] = Some(field.clone());
+                    fields[program.index()] = Some((outputs.clone(), field.clone()));
                 }
                 return;
             }
@@ -83,12 +83,11 @@ pub fn simulate(
             Happening::Run(event) => Record::of_run(now.0, event),
             happening => Record::of_member(now.0, member, &members, happening),
         };
-        let moment = applied.as_ref().map(|(moment, _)| *moment);
-        take(&record, moment.zip(cycle));
-        let (Some((moment, outputs)), Some(program)) = (applied, member.sampled_program()) else {
+        take(&record, applied.zip(cycle));
+        let (Some(moment), Some(program)) = (applied, member.sampled_program()) else {
             return;
         };
-        if let Some(field) = fields[program.index()].take() {
+        if let Some((outputs, field)) = fields[program.index()].take() {
             let event = Happening::Plant(PlantEvent::Stepped {
                 moment,
                 pace: Pace::Driven,
@@ -110,11 +109,10 @@ pub fn simulate(
     Ok(account)
 }
 
-fn applied(happening: &Happening) -> Option<(Moment, Image)> {
+/// The moment of a deadline that a remote I/O has passed with outputs.
+fn applied(happening: &Happening) -> Option<Moment> {
     match happening {
-        Happening::RemoteIo(event @ RemoteIoEvent::Applied { moment, .. }) => {
-            Some((*moment, event.driven()?.clone()))
-        }
+        Happening::RemoteIo(RemoteIoEvent::Applied { moment, .. }) => Some(*moment),
         _ => None,
     }
 }

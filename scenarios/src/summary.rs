@@ -42,6 +42,9 @@ pub struct Summary {
     pub origin_at: Option<String>,
     /// Whether it was asked to end early.
     pub interrupted: bool,
+    /// Why fewer cycles were completed than were asked for: the remote I/Os that pass no deadlines, each with its reason, where that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ended_early: Option<String>,
     /// By rank.
     pub stations: Vec<StationSummary>,
     /// By program.
@@ -325,6 +328,7 @@ impl Summary {
         journal: JournalState,
     ) -> (Self, Account) {
         let finished = account.finish();
+        let ends_early = !account.interrupted && finished.cycles_run < scenario.cycles;
         let members = &account.terms.members;
         let name = |member| members.name(member).to_owned();
         let stations = members.stations().zip(finished.presences).map(
@@ -351,7 +355,8 @@ impl Summary {
             Some(PlantSummary {
                 name: name.to_owned(),
                 remote_io: members.name(Member::RemoteIo(ProgramId(program as u8))).to_owned(),
-                functional: service.functional(),
+                // In a cycle that was not completed no remote I/O drove it.
+                functional: service.functional() && !ends_early,
                 finished: service.finished(),
                 plant_faults: service.plant_faults(),
                 intervals: service.intervals.clone(),
@@ -388,6 +393,7 @@ impl Summary {
             origin: account.origin().map(|origin| origin.to_string()),
             origin_at: account.origin_at().map(|at| at.to_string()),
             interrupted: account.interrupted,
+            ended_early: account.absences().filter(|_| ends_early),
             stations: stations.collect(),
             remote_ios: remote_ios.collect(),
             plants: plants.collect(),

@@ -11,7 +11,10 @@ impl Summary {
             (Some(why), false, _) => format!("INCONCLUSIVE: {why}; neither passed nor failed"),
             (None, false, true) => format!("interrupted after {run} of {asked} cycles"),
             (None, false, false) if run < asked => {
-                format!("FAILED: only {run} of {asked} cycles were completed")
+                let why = self.ended_early.as_ref().map_or_else(String::new, |why| {
+                    format!("; then no remote I/O passed a deadline: {why}")
+                });
+                format!("FAILED: only {run} of {asked} cycles were completed{why}")
             }
             (None, false, false) => "FAILED".to_owned(),
         }

@@ -1,10 +1,11 @@
 //! Twins of remote I/Os: those that cannot work are refused by `understudy check`, each with a code, in words of the cluster file.
 
+use std::collections::BTreeMap;
 use std::fs;
 
 use serde_json::Value;
 
-use crate::{empty_folder, understudy, understudy_in};
+use crate::{Answer, empty_folder, understudy, understudy_in};
 
 const PUMP: &str = "program pump\ninput full\noutput run\nrung \"run\"\n  /full ( run )\n";
 
@@ -109,4 +110,76 @@ fn a_plant_is_recorded_whichever_of_two_remote_ios_drives_it() {
         let count = steps.iter().filter(|member| *member == plant).count();
         assert!(count >= 990, "{plant}: {count}");
     }
+}
+
+fn simulated(name: &str, cell: &str, scenario: &str) -> (Answer, Vec<Value>) {
+    let out = empty_folder(name);
+    let file = out.join("scenario.toml");
+    fs::write(&file, scenario).expect("written");
+    let [scenario, to] = [&file, &out].map(|path| path.to_str().expect("text"));
+    let answer =
+        understudy(&["simulate", cell, "--scenario", scenario, "--seed", "1", "--out", to]);
+    let journal = fs::read_to_string(out.join("latest/journal.jsonl")).expect("a journal");
+    let records = journal.lines().map(|line| serde_json::from_str(line).expect("JSON"));
+    (answer, records.collect())
+}
+
+const VALVE: &str = "examples/shared-valve/cluster.toml";
+
+fn crashes(steps: &[(u32, &str)]) -> String {
+    let steps = steps.iter().map(|(at, station)| {
+        format!("[[step]]\nat = {at}\naction = \"crash\"\nstation = \"{station}\"\n")
+    });
+    format!("title = \"Crashes\"\ncycles = 400\n{}", steps.collect::<String>())
+}
+
+/// A valve with two current modules gets half of its current until the other module drives all of it, and the journal has what it gets.
+#[test]
+fn the_steps_of_a_plant_have_the_outputs_that_its_actuators_get() {
+    let (answer, records) = simulated("sum_of_twins", VALVE, &crashes(&[(100, "tank-io")]));
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    let inlet = |record: &Value| {
+        let word = record["event"]["outputs"]["words"][0].as_u64().expect("a word");
+        f32::from_bits(word as u32)
+    };
+    let of = |event: &str| {
+        let own = records.iter().filter(|record| record["event"]["event"] == event);
+        own.map(|it| (it["event"]["moment"]["cycle"].as_u64().expect("a cycle"), inlet(it)))
+            .collect::<BTreeMap<u64, f32>>()
+    };
+    let (decided, got) = (of("applied"), of("stepped"));
+    let mut shares = [0; 2];
+    // Cycles of the cluster: in the first ones the modules begin.
+    for (cycle, got) in got.into_iter().filter(|(cycle, _)| *cycle > 50) {
+        let Some(decided) = decided.get(&cycle).filter(|decided| **decided > 0.0) else { continue };
+        // The follower drives its part of the number before.
+        let share = got / decided;
+        assert!((0.4..1.1).contains(&share), "{cycle}: {got} of {decided}");
+        shares[usize::from(share > 0.6)] += 1;
+    }
+    assert!((2..=14).contains(&shares[0]) && shares[1] > 200, "{shares:?}");
+}
+
+/// The follower asks the operator, since the controller that failed could have a newer state: no remote I/O drives from then on.
+#[test]
+fn a_run_that_no_remote_io_goes_on_with_says_why() {
+    let both = crashes(&[(100, "level"), (108, "tank-io")]);
+    let (answer, _) = simulated("no_author", VALVE, &both);
+    let reason = "FAILED: only 108 of 400 cycles were completed; then no remote I/O passed a deadline: tank-io is killed, \
+                  tank-io-2 asks the operator which state its program continues from\n";
+    let told = [reason, "tank     NOT FUNCTIONAL"];
+    assert_eq!(answer.status, 1, "{}", answer.shown());
+    assert!(told.iter().all(|text| answer.output.contains(text)), "{}", answer.shown());
+}
+
+/// The links of a twin fail alone, in both directions.
+#[test]
+fn a_cut_names_a_twin() {
+    let cut = "title = \"Cut\"\ncycles = 100\n[[step]]\nat = 50\naction = \"cut\"\nstation = \"press\"\n\
+               to = [\"press-io-2\"]\nboth_ways = true\n";
+    let (answer, records) = simulated("cut_of_twin", "examples/twin-remote-io/cluster.toml", cut);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    let flagged = records.iter().filter(|record| record["event"]["event"] == "flagged");
+    let by: Vec<&str> = flagged.filter_map(|record| record["name"].as_str()).collect();
+    assert_eq!(by, ["press-io-2"]);
 }

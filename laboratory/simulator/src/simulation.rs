@@ -18,8 +18,8 @@ use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Audience, Configurations, Field, Frame, Header, Member, ProgramId, ProgramSet, StationId,
-    StationSet, Time,
+    Audience, Configurations, Field, Frame, Header, Image, Member, ProgramId, ProgramSet,
+    StationId, StationSet, Time,
 };
 
 use crate::disk::Disks;
@@ -51,7 +51,12 @@ pub enum Record<'a> {
     /// Of a remote I/O.
     RemoteIo(&'a understudy_remote_io::Event),
     /// A plant moved.
-    Plant(&'a Field),
+    Plant {
+        /// What its actuators got, of both remote I/Os of its program together.
+        outputs: &'a Image,
+        /// What it shows then.
+        field: &'a Field,
+    },
     /// A fault was done.
     Fault(&'a Fault),
     /// Something that must never happen.

@@ -64,6 +64,18 @@ impl Account {
         let listed: Vec<Stall> = listed.filter(|stall| stall.cycle < self.cycles).collect();
         Finished { cycles_run, presences: presences.finish(cycles_run), stalls: listed }
     }
+
+    /// Why remote I/Os pass no deadlines in the end; nothing where all of them do.
+    pub(crate) fn absences(&self) -> Option<String> {
+        self.absences.text(&self.terms.members)
+    }
+
+    /// How often a remote I/O that was killed took the records of its last samples with it, so that its outputs were not judged for a time.
+    pub(crate) fn gaps(&self) -> impl Iterator<Item = (ProgramId, u64)> {
+        let referees = self.terms.referees.iter().enumerate();
+        let gaps = referees.map(|(program, referee)| (ProgramId(program as u8), referee.gaps()));
+        gaps.filter(|(_, gaps)| *gaps > 0)
+    }
 }
 
 /// See [`Account::finish`].

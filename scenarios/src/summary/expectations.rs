@@ -18,7 +18,7 @@ pub(super) fn expectations(
     let wrong = at_most("wrong outputs", expect.wrong, summary.violation_count, 0);
     let mut list = vec![ExpectationSummary { needs_time: false, ..wrong }];
     for (member, records) in &account.unwritten {
-        if matches!(member, Member::RemoteIo(_)) {
+        if member.sampled_program().is_some() {
             list.push(ExpectationSummary {
                 expected: format!("all that {} drove is judged", account.terms.members.name(*member)),
                 found: format!(
