@@ -231,6 +231,12 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
             answer.body
         );
     }
+    // The signals that the run has keep their values next to one that it does not have.
+    let mixed = page.get("/api/values?signals=0.state.nothing,0.input.0&cycle=100").json();
+    let alone = page.get("/api/values?signals=0.input.0&cycle=100").json();
+    assert_eq!(mixed["values"], serde_json::json!([null, alone["values"][0]]));
+    assert!(alone["values"][0].is_boolean());
+    assert_eq!(mixed["unknown"], serde_json::json!(["0.state.nothing"]));
     for method in ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"] {
         let answer = page.request(&format!(
             "{method} /api/state HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n",

@@ -102,13 +102,13 @@ async function refresh(now) {
     const asked = [...chosen];
     const answer = await act(() => ask(`api/values?signals=${encodeURIComponent(asked.join(","))}&${cycleParameter()}`));
     if (answer) {
-      fill(new Map(asked.map((signal, place) => [signal, answer.values[place]])), answer.cycle);
+      fill(new Map(asked.map((signal, place) => [signal, answer.values[place]])), answer.cycle, answer.unknown);
     }
   } while (again && !isLive());
   asking = false;
 }
 
-function fill(values, cycle) {
+function fill(values, cycle, unknown = []) {
   const hasSome = chosen.length > 0;
   id("watch-tools").hidden = !hasSome;
   setAttribute(id("watch-trends"), "href", addressOf("trends", { signals: chosen.slice(0, 16).join(",") }));
@@ -120,7 +120,8 @@ function fill(values, cycle) {
     const force = forceOf(signal);
     const value = values.get(signal.id);
     // A forced output is driven with the forced value.
-    const text = valueText(force && signal.kind === "output" ? force.value : value, signal.type);
+    const text = unknown.includes(signal.id) ? "no such signal"
+      : valueText(force && signal.kind === "output" ? force.value : value, signal.type);
     setText(row.querySelector(".watch-value"), text);
     setText(row.querySelector(".watch-forced"), force ? ` F forced by ${force.owner}` : "");
     setAttribute(row, "data-value", text);

@@ -134,6 +134,8 @@ pub(super) struct Values {
     cycle: i64,
     /// In the order of the request; nothing where one is not known.
     values: Vec<Value>,
+    /// Identifiers of the request that no signal has; the request is refused where it has no other ones.
+    unknown: Vec<String>,
 }
 
 /// Inputs and outputs as last sampled and applied, and the state after the scan of the cycle.
@@ -146,10 +148,18 @@ pub(super) async fn values(
     at_cycle(&app, wanted.cycle, |known, cycle| {
         let mut signals = Signals::default();
         let mut values = vec![Value::Null; names.len()];
+        let mut unknown = Vec::new();
         let mut of_states: BTreeMap<u8, (Vec<usize>, Vec<StateSignal>)> = BTreeMap::new();
         for (place, name) in names.iter().enumerate() {
             let series = known.run.series();
-            let (program, signal) = signals.find(known, name)?;
+            let (program, signal) = match signals.find(known, name) {
+                Ok(found) => found,
+                Err(_) if unknown.len() + 1 < names.len() => {
+                    unknown.push((*name).to_owned());
+                    continue;
+                }
+                Err(problem) => return Err(problem),
+            };
             let (point, image) = match signal {
                 Signal::Input(point) => (point, series.inputs(program)),
                 Signal::Output(point) => (point, series.outputs(program)),
@@ -171,7 +181,7 @@ pub(super) async fn values(
                 values[place] = signal.shown(value);
             }
         }
-        Ok(Values { cycle, values })
+        Ok(Values { cycle, values, unknown })
     })
     .map(Json)
 }
