@@ -228,7 +228,7 @@ impl<'m> Explainer<'m> {
         let when = if at == place {
             String::new()
         } else {
-            format!(" in cycle {}, and kept since", self.cycle(at))
+            format!(" in cycle {}, and unchanged since", self.cycle(at))
         };
         let rung = &self.program.rungs[decision.rung];
         Reason {

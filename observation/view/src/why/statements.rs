@@ -384,19 +384,41 @@ impl<'m> Explainer<'m> {
             let text = format!("unchanged since the scan of cycle {when}");
             return self.leaf(&part.name, value, place, text);
         };
-        let kept = if since == place {
-            format!("assigned in cycle {when}")
-        } else {
-            format!("assigned in cycle {when}, and kept since")
-        };
-        let mut reason = self.leaf(&part.name, value, place, kept);
+        let text = format!("assigned in cycle {when}");
+        let mut reason = self.leaf(&part.name, value, place, text);
         let done = &trace.done[write];
+        if since != place {
+            reason.text += &self.kept_text(part, place, (done.routine, done.line));
+        }
         self.locate(&mut reason, done.routine, done.line);
         if is_followed {
             let written = (part.name.as_str(), part.address, value);
             reason.because = self.written(written, &trace, write, writer, depth + 1).because;
         }
         reason
+    }
+
+    /// How a value went on that an earlier scan than the last one gave to a variable: it may have been assigned again in each scan.
+    fn kept_text(&mut self, part: &Part, place: usize, by: (RoutineId, u32)) -> String {
+        let again = self.history.scan_before(place).and_then(|last| {
+            let trace = self.trace(last)?;
+            let done = &trace.done[trace.last_write(part.address)?];
+            Some((self.cycle(last), (done.routine, done.line)))
+        });
+        match again {
+            None => ", and unchanged since".to_owned(),
+            Some((cycle, of)) if of == by => {
+                format!(", and again with the same value, last in cycle {cycle}")
+            }
+            Some((cycle, (routine, line))) => {
+                let routine = self.program.routine(routine);
+                let at = match self.text.declares(&routine.name) && line > 0 {
+                    true => format!("line {line}"),
+                    false => format!("the library block {}", routine.name),
+                };
+                format!(", and again with the same value, last in cycle {cycle} by {at}")
+            }
+        }
     }
 }
 

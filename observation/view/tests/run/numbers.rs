@@ -294,10 +294,52 @@ fn the_conditions_that_were_false_explain_a_default() {
     assert_eq!(found, BTreeSet::from(expected));
     // A value that was kept: what could have assigned it in this cycle.
     let kept = model.why("feed.kept", Some(90)).expect("known").because.expect("a reason");
-    assert!(kept.text.contains("and kept since"), "{kept:#?}");
+    assert!(kept.text.contains("and unchanged since"), "{kept:#?}");
     let other = &kept.because[0];
     assert_eq!((other.line, other.cycle), (Some(15), 90), "{kept:#?}");
     assert_eq!(other.because[0].signal, "n", "{kept:#?}");
+}
+
+/// Assigns one value in each scan, by one statement and then by another one.
+const AGAIN: &str = "\
+PROGRAM feed
+  VAR_INPUT speed : INT; run : BOOL; END_VAR
+  VAR_OUTPUT share : INT; rate : REAL; busy : BOOL; END_VAR
+  VAR n : INT; on : BOOL; END_VAR
+  busy := on;
+  n := n + 1;
+  IF n > 20 THEN
+    on := TRUE;
+  END_IF;
+  IF n > 40 THEN
+    on := TRUE;
+  END_IF;
+  IF n > 60 THEN
+    n := 61;
+  END_IF;
+END_PROGRAM
+";
+
+#[test]
+fn a_value_that_was_assigned_again_is_none_that_was_kept() {
+    let model = seen(&cluster_of(AGAIN, BELT), "title = \"again\"\ncycles = 100\n");
+    let text = |cycle: i64| {
+        let because = model.why("feed.busy", Some(cycle)).expect("known").because;
+        let because = because.expect("a reason").because;
+        let on = because.iter().find(|reason| reason.signal == "on").expect("it is read");
+        assert_eq!((&on.value, on.line), (&json!(true), Some(8)), "{on:#?}");
+        on.text.clone()
+    };
+    // It became true in a cycle near the 20th, by line 8, and is assigned in every one since.
+    let first = (10..40).find(|cycle| {
+        let why = model.why("feed.busy", Some(*cycle)).expect("known");
+        why.value == json!(true)
+    });
+    let set = first.expect("it is set") - 1;
+    assert_eq!(text(set + 1), format!("assigned in cycle {set}"));
+    let again = format!("assigned in cycle {set}, and again with the same value, last in cycle");
+    assert_eq!(text(set + 5), format!("{again} {}", set + 4));
+    assert_eq!(text(set + 30), format!("{again} {} by line 11", set + 29));
 }
 
 /// Copies arrays and structures as wholes, on the way to its outputs and into variables that it keeps.
@@ -353,10 +395,10 @@ fn a_part_of_what_was_copied_as_a_whole_is_explained() {
         assert_eq!((&at.value, at.line), (&json!(value), line), "{at:#?}");
     }
     assert_eq!(why("feed.second.on").value, json!(true));
-    // Never assigned alone, and kept since the scan that copied it.
+    // Never assigned alone, and unchanged since the scan that copied it.
     let early = why("feed.early.left");
     assert_eq!(early.value, json!(60));
-    assert!(early.text.contains("and kept since"), "{early:#?}");
+    assert!(early.text.contains("and unchanged since"), "{early:#?}");
     assert!(find(&early, "speed").is_some(), "{early:#?}");
     // Not assigned at all but within its whole.
     assert_eq!(why("feed.other[0]").because[0].text, "its initial value");

@@ -1,6 +1,7 @@
 //! Why a block is as it is: a timer, a counter, a latch or an edge, and the earlier scan in which that began.
 
 use understudy_ladder::{BlockKind, Element, ElementFlow, Reading, visit};
+use understudy_text::duration;
 
 use super::super::Reason;
 use super::super::power::{AtBlock, Node, at_block, nodes};
@@ -106,11 +107,11 @@ impl Explainer<'_> {
         let flow = found.node.flow;
         let (enters, leaves) = (flow.enters, flow.leaves);
         let elapsed = match flow.reading {
-            Reading::Time(elapsed) => format!("{elapsed:?}"),
+            Reading::Time(elapsed) => duration::text(elapsed),
             Reading::Number(number) => number.to_string(),
             _ => String::new(),
         };
-        let preset = found.block.kind.preset_time().unwrap_or_default();
+        let preset = duration::text(found.block.kind.preset_time().unwrap_or_default());
         match found.block.kind {
             BlockKind::Ton(_) | BlockKind::Tof(_) => {
                 let on = matches!(found.block.kind, BlockKind::Ton(_));
@@ -127,9 +128,9 @@ impl Explainer<'_> {
                 };
                 let what = if on { "its input has power" } else { "its input has no power" };
                 let over = if leaves == on {
-                    format!("its {preset:?} are over")
+                    format!("its {preset} are over")
                 } else {
-                    format!("{elapsed} of {preset:?}")
+                    format!("{elapsed} of {preset}")
                 };
                 (format!("{what} {since}, {over}"), None)
             }
@@ -145,7 +146,7 @@ impl Explainer<'_> {
                 let (since, _) = self.unchanged(name, rung, place, |flow| flow.leaves);
                 (
                     format!(
-                        "its pulse began in cycle {}, {elapsed} of {preset:?}",
+                        "its pulse began in cycle {}, {elapsed} of {preset}",
                         self.cycle(since)
                     ),
                     Some(since),
@@ -165,7 +166,7 @@ impl Explainer<'_> {
                     let (since, _) = self.unchanged(name, rung, place, |flow| flow.enters);
                     let set = self.history.scan_before(since).unwrap_or(since);
                     return (
-                        format!("set in cycle {}, and kept since", self.cycle(set)),
+                        format!("set in cycle {}, and unchanged since", self.cycle(set)),
                         Some(set),
                     );
                 }
