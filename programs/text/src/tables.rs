@@ -34,6 +34,12 @@ pub struct Codes {
     pub unknown_word: &'static str,
 }
 
+/// A name as a key: in quotes where it has other letters than those of a bare one, such as `list[1]` or `pair.left`.
+pub fn key_text(name: &str) -> String {
+    let is_bare = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
+    if name.chars().all(is_bare) { name.to_owned() } else { format!("{name:?}") }
+}
+
 /// The tables of `text`; nothing where it is not TOML, because what the recovery makes of a broken text would only bring
 /// errors that follow from the first ones.
 pub fn parse<'t>(

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use understudy_interchange::Source;
 use understudy_text::duration;
+use understudy_text::tables::key_text;
 use understudy_wire::MAXIMUM_STATE_BITS;
 
 use crate::address::MAXIMUM_NAME_LENGTH;
@@ -253,7 +254,7 @@ controller = \"{name}\"
     for output in outputs {
         let declared = &output.declared;
         let safe = value_text(declared, output.nearest(0) as u64 & declared.of.mask());
-        let line = format!("{} = {safe}", key(&output.name));
+        let line = format!("{} = {safe}", key_text(&output.name));
         let _ = match &output.note {
             Some(note) => writeln!(text, "{line}  # {note}"),
             None => writeln!(text, "{line}"),
@@ -279,17 +280,11 @@ ladder = {file:?}
     );
     let renamed: Vec<String> = stub
         .renamed()
-        .map(|(terminal, signal)| format!("{} = {signal:?}\n", key(terminal)))
+        .map(|(terminal, signal)| format!("{} = {signal:?}\n", key_text(terminal)))
         .collect();
     if !renamed.is_empty() {
         let _ = write!(text, "\n[plant.signals]\n{}", renamed.concat());
     }
-}
-
-/// A key of TOML.
-fn key(name: &str) -> String {
-    let bare = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
-    if name.chars().all(bare) { name.to_owned() } else { format!("{name:?}") }
 }
 
 /// One line that a comment can have.

@@ -10,6 +10,7 @@ use understudy_plant::{
 };
 use understudy_text::Diagnostic;
 use understudy_text::spelling::{nearest, suggestion};
+use understudy_text::tables::key_text;
 use understudy_typed::Declared;
 use understudy_wire::ProgramId;
 
@@ -302,7 +303,8 @@ fn describe(problem: BindingProblem, draft: &Draft, interface: &Interface) -> Di
             let help = match near {
                 Some(near) if !section.signals.contains_key(&terminal) => {
                     format!(
-                        "did you mean `{near}`? bind it with `signals = {{ {terminal} = \"{near}\" }}`"
+                        "did you mean `{near}`? bind it with `signals = {{ {} = \"{near}\" }}`",
+                        key_text(&terminal)
                     )
                 }
                 _ => known_names(&signal, &known),

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use understudy_remote_io::{PairedInput, PointPlace, SWITCHOVER, SharedOutputs, Wiring};
 use understudy_text::spelling::suggestion;
-use understudy_text::tables::Constant;
+use understudy_text::tables::{Constant, key_text};
 use understudy_text::{Diagnostic, duration};
-use understudy_typed::Elementary;
+use understudy_typed::{Elementary, Points};
 
 use super::Member;
 use super::names::Names;
@@ -175,17 +175,25 @@ fn check_outputs(
     let is_shared = |name: &str| section.share.contains_key(name);
     let numbers = interface.outputs.iter().filter(|output| is_number(output.of));
     let numbers = numbers.filter(|output| !is_shared(&output.name));
-    for output in numbers.take(MAXIMUM_MISFITS) {
+    // A name that no output has is reported already, and may be meant for one of these.
+    let are_known = section.share.keys().all(|name| interface.outputs.find(name).is_some());
+    for output in numbers.filter(|_| are_known).take(MAXIMUM_MISFITS) {
         let message = format!(
             "`{}` is {}, and two modules through diodes drive outputs of bits only",
             output.name, output.of
         );
         let found = Diagnostic::error("U0260", message, section.span.clone());
         let help = match SharedOutputs::can_share(output.of) && output.values.is_none() {
-            true => format!(
-                "add `share = {{ {} = \"half\" }}` where the currents of the two modules add up, or use wiring \"exclusive\"",
-                output.name
-            ),
+            true => {
+                let key = key_text(&output.name);
+                let share = match section.share.is_empty() {
+                    true => format!("`share = {{ {key} = \"half\" }}`"),
+                    false => format!("`{key} = \"half\"` to `share`"),
+                };
+                format!(
+                    "add {share} where the currents of the two modules add up, or use wiring \"exclusive\""
+                )
+            }
             false => "use wiring \"exclusive\" for a program with this output".to_owned(),
         };
         diagnostics.push(found.with_help(help));
@@ -201,6 +209,18 @@ fn check_outputs(
             output.name
         );
         diagnostics.push(Diagnostic::warning("U0261", message, section.span.clone()));
+    }
+}
+
+/// What may be meant by a name that no output has: the parts of an array or of a structure are outputs of their own.
+fn output_help(name: &str, outputs: &Points) -> String {
+    let is_part =
+        |output: &&str| output.strip_prefix(name).is_some_and(|rest| rest.starts_with(['[', '.']));
+    let parts = outputs.names().filter(is_part).take(MAXIMUM_MISFITS);
+    let parts: Vec<String> = parts.map(|part| format!("{} = \"half\"", key_text(part))).collect();
+    match parts.is_empty() {
+        true => suggestion(name, outputs.names()),
+        false => format!("each part is an output of its own: `{}`", parts.join(", ")),
     }
 }
 
@@ -223,8 +243,7 @@ fn read_shares(
         };
         let Some(output) = interface.outputs.iter().find(|output| output.name == *name) else {
             let message = format!("`{}` has no output `{name}`", member.name);
-            let help = suggestion(name, interface.outputs.names());
-            refuse("U0209", message, span, help);
+            refuse("U0209", message, span, output_help(name, &interface.outputs));
             continue;
         };
         let binding = device.and_then(|device| {

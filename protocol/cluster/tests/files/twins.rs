@@ -141,7 +141,9 @@ fn twins_with_modules_of_their_own() {
     wrong(half, "", "TIME", "U0204");
     wrong(", share = { pump = \"same\" }", "", "REAL", "U0207");
     wrong(", share = { pum = \"half\" }", "", "REAL", "U0209");
-    wrong(", share = { pum = \"half\" }", "", "REAL", "U0260");
+    // The right name is missing because of the wrong one.
+    let (_, found) = parallel(", share = { pum = \"half\" }", "", "REAL");
+    assert!(!found.contains("U0260"), "{found}");
     let (cluster, found) = parallel("", "", "WORD");
     assert!(cluster.is_some(), "{found}");
     wrong("", "fail_safe = { pump = true }\n", "BOOL", "U0261");
@@ -208,4 +210,23 @@ fn numbers_that_two_modules_share() {
     let text = format!("{CELL}[[remote_io]]\ncontroller = \"tank\"\ntwin = {{ {keys} }}\n");
     let found = findings(&load(&text, &[("tank.st", &tank("INT"))]).reports);
     assert!(found.contains("U0259"), "{found}");
+}
+
+/// What the help says can be written as it is: names of elements and members are in quotes.
+#[test]
+fn the_help_of_shares_is_text_of_a_cluster_file() {
+    let check = |share: &str, wanted: &str, code: &str| {
+        let more = if share.is_empty() { String::new() } else { format!(", {share}") };
+        let (cluster, found) = parallel(&more, "", "ARRAY[0..1] OF REAL");
+        assert_eq!(cluster.is_some(), wanted.is_empty(), "{found}");
+        assert!(found.contains(wanted), "{found}");
+        let codes = ["U0209", "U0260"].map(|code| found.matches(code).count() > 0);
+        assert_eq!(codes, [code == "U0209", code == "U0260"], "{found}");
+    };
+    let [first, second] = ["\"pump[0]\" = \"half\"", "\"pump[1]\" = \"half\""];
+    check("", &format!("add `share = {{ {first} }}`"), "U0260");
+    check(&format!("share = {{ {first} }}"), &format!("add `{second}` to `share`"), "U0260");
+    check(&format!("share = {{ {first}, {second} }}"), "", "");
+    // The whole has no share.
+    check("share = { pump = \"half\" }", &format!("`{first}, {second}`"), "U0209");
 }
