@@ -119,6 +119,7 @@ fn a_program_changes_while_stations_are_killed() {
     let out = empty_folder("changes");
     let before = write_cluster(&out.join("before"), &counter("INT", 1));
     let after = write_cluster(&out.join("after"), &counter("DINT", 10));
+    let other = write_cluster(&out.join("other"), &counter("DINT", 100));
     let runs = out.join("runs");
     let more = ["--cycles", "100000", "--allow-commands"];
     let (child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
@@ -170,6 +171,22 @@ fn a_program_changes_while_stations_are_killed() {
     records.wait_for("the change back", |record| is(record, "counter-io", "program-changed"));
     let (exit, document, errors) = answer(&["change", run_text, &after, "cancel", "--drop"]);
     assert_eq!(exit, 0, "cancelled already: {document:#} {errors}");
+    // While another change runs its programs, none that is over can be cancelled again: the old programs do not run.
+    for word in ["prepare", "switch"] {
+        let (exit, document, errors) = answer(&["change", run_text, &other, word]);
+        assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+    }
+    records.wait_for("the other change", |record| is(record, "counter-io", "program-changed"));
+    for again in [&["cancel", "--drop"][..], &["accept"]] {
+        let (exit, document, _) = answer(&[&["change", run_text, &after], again].concat());
+        let failure = &document["failures"][0];
+        assert_eq!((exit, &failure["code"]), (1, &Value::from("U0632")), "{document:#}");
+        let why = failure["message"].as_str().unwrap_or_default();
+        assert!(why.contains("another online change is prepared"), "{again:?}: {document:#}");
+    }
+    let (exit, document, errors) = answer(&["change", run_text, &other, "cancel", "--drop"]);
+    assert_eq!(exit, 0, "{document:#} {errors}");
+    records.wait_for("the change back", |record| is(record, "counter-io", "program-changed"));
     done("prepare");
     done("accept");
     done("accept");
@@ -191,7 +208,7 @@ fn a_program_changes_while_stations_are_killed() {
     done("accept");
     let counts = ended_well(child, &runs, &run);
     let steps = steps(&counts);
-    assert_eq!(steps, [1, 10, 1, 10], "{steps:?}");
+    assert_eq!(steps, [1, 10, 1, 100, 1, 10], "{steps:?}");
 }
 
 /// The count has another name in the new program. Members whose pairs are wrong load nothing; the right pair is still in the file of the next change.

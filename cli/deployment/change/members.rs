@@ -133,8 +133,8 @@ impl<'a> Members<'a> {
         }
     }
 
-    /// Of what was refused because no change is loaded: a member that has this configuration alone is done, and one that has accepted the change says
-    /// so.
+    /// Of what was refused because this change is not loaded: a member that has this configuration alone is done. One that has accepted the change, has loaded
+    /// another one or runs another configuration says so.
     pub(super) fn find_done(
         &self,
         texts: &ChangeTexts,
@@ -156,7 +156,8 @@ impl<'a> Members<'a> {
                     let refusal = OrderRefusal::IsOver;
                     *said = Err(format!("{}: {refusal}", refusal.code()));
                 }
-                _ => {}
+                Some(Err(why)) => *said = Err(why),
+                None => {}
             }
         }
     }
