@@ -158,7 +158,7 @@ pub(crate) static CONTROLLER: Section = Section {
     keys: keys! {
         required name: Kind::Name, "names the station";
         required ladder: Kind::Text, "the file with its program, relative to the cluster file";
-        key renamed: Kind::Names, "variables that had another name in the program before, such as `{ speed = \"velocity\" }`; an [online change](../how-to/online-change.md#renamed-variables) and a restart take their values over";
+        key renamed: Kind::Names, "variables that had another name in the program before: the old name as the key, the name in this program as the value, such as `{ speed = \"velocity\" }` for a `speed` that is `velocity` now; an [online change](../how-to/online-change.md#renamed-variables) and a restart take their values over";
         key address: Kind::Address, "where it listens, such as `192.168.1.11:7450`; the laboratory picks a free loopback port where it is absent";
         key second_address: Kind::Address, "with `networks = 2`: where it listens on the second network";
     },

@@ -11,10 +11,10 @@ pub type Renamed = (String, String);
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WrongPair {
     /// The old program has neither of the two paths.
-    #[error("the program before has no `{0}`")]
+    #[error("the program before has no `{0}`; a pair is `old = \"new\"`")]
     NoSuchPath(String),
     /// The new program has the old path too.
-    #[error("the program after has `{0}` too, so that is no other name")]
+    #[error("the program after has `{0}` too, so that is no other name; a pair is `old = \"new\"`")]
     StillThere(String),
 }
 

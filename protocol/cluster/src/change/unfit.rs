@@ -24,7 +24,7 @@ pub enum Unfit {
         why: Unnamed,
     },
     /// A pair of `renamed` names what it cannot.
-    #[error("`{old}` of `{program}` is not renamed to `{new}`: {why}")]
+    #[error("`{program}`: the old variable `{old}` is not renamed to the new one `{new}`: {why}")]
     Pair {
         /// Name of the controller.
         program: String,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use understudy_text::Diagnostic;
+use understudy_text::tables::key_text;
 use understudy_typed::Renamed;
 
 use crate::code::Code;
@@ -25,9 +26,16 @@ pub(super) fn pairs(
             let help = "leave one of the two pairs out";
             diagnostics.push(Diagnostic::error("U0208", message, span).with_help(help));
         } else if !code.typed().has_path(path) {
-            let message =
-                format!("the program has no variable `{path}`, which `{old}` is renamed to");
-            let help = "the path of a variable, or of a member such as `pump.hours`; elements of arrays keep their indices";
+            let message = format!(
+                "the program has no variable `{path}`, which is the new name of the old `{old}`"
+            );
+            let help = match code.typed().has_path(old) {
+                true => format!(
+                    "the old name is the key, and the new one the value: `{} = {old:?}`",
+                    key_text(path)
+                ),
+                false => "the path of a variable, or of a member such as `pump.hours`; elements of arrays keep their indices".to_owned(),
+            };
             diagnostics.push(Diagnostic::error("U0209", message, span).with_help(help));
         }
         known.push(path);

@@ -126,6 +126,11 @@ fn the_cluster_file_names_variables_of_its_program_once_each() {
         let is = |line: &str| line.contains(code) && line.contains(&format!("`{name}`"));
         assert!(found.lines().any(is), "{name}: {found}");
     }
+    // The two names of a pair are the wrong way round.
+    let turned = "renamed = { sum = \"count before\" }";
+    let found = findings(&load(&file("one.st", turned), &[("one.st", &text)]).reports);
+    assert!(found.contains("new name of the old `sum`"), "{found}");
+    assert!(found.contains("`\"count before\" = \"sum\"`"), "{found}");
 }
 
 /// All that is wrong with pairs for the program that runs is said in one run.
