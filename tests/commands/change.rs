@@ -115,8 +115,8 @@ fn a_value_that_is_not_followed_leaves_the_rest_proved() {
              wait(IN := start, PT := T#50ms);\n valve := wait.Q AND NOT stop;\n full := parts = {last};\nEND_PROGRAM\n"
         )
     };
-    write(&folder, "old", &program("INT", 5));
-    write(&folder, "new", &program("DINT", 5));
+    write(&folder, "old", &program("DINT", 5));
+    write(&folder, "new", &program("INT", 5));
     let json =
         understudy_in(&folder, &["change", "old/cluster.toml", "new/cluster.toml", "--json"])
             .json();
@@ -125,6 +125,31 @@ fn a_value_that_is_not_followed_leaves_the_rest_proved() {
     assert_eq!(full["verdict"], "undecided", "{json}");
     let why = full["reason"].as_str().unwrap_or_default();
     assert!(why.contains("`parts` has another type"), "{full}");
+}
+
+/// A value goes on in a type that has all values, and the proof follows it: the counter is equal up to its reset, and a longer count is another one.
+#[test]
+fn a_value_in_a_wider_type_is_followed_through_the_switch() {
+    let folder = empty_folder("change_wider");
+    let program = |of: &str, last: u32| {
+        format!(
+            "PROGRAM one\n VAR_INPUT start, stop : BOOL; END_VAR\n VAR_OUTPUT full, half : BOOL; END_VAR\n VAR parts : {of}; END_VAR\n\
+             IF start THEN parts := parts + 1; END_IF;\n IF stop OR parts > {last} THEN parts := 0; END_IF;\n\
+             full := parts = 5;\n half := parts = 2;\nEND_PROGRAM\n"
+        )
+    };
+    for [before, now] in [["INT", "DINT"], ["USINT", "LINT"], ["SINT", "INT"]] {
+        write(&folder, "old", &program(before, 5));
+        for (last, expected) in [(5, "equal"), (6, "differs")] {
+            write(&folder, "new", &program(now, last));
+            let asked = ["change", "old/cluster.toml", "new/cluster.toml", "--json"];
+            let json = understudy_in(&folder, &asked).json();
+            for output in ["full", "half"] {
+                let found = &verdict(&json, output)["verdict"];
+                assert_eq!(found, expected, "{before} to {now}, {last}, {output}: {json}");
+            }
+        }
+    }
 }
 
 #[test]

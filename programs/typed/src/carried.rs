@@ -30,7 +30,7 @@ use std::collections::HashMap;
 
 use self::renamed::Moves;
 pub use self::renamed::{Renamed, WrongPair};
-pub use self::successor::{Origin, Successor};
+pub use self::successor::{Origin, Successor, Taken};
 use self::types::{Conversion, conversion};
 use crate::form::{Program, Variable};
 use crate::image::{Declared, Points};
@@ -283,7 +283,12 @@ impl<'p> Walk<'p> {
     /// Notes that a value comes from an address of the old program.
     fn comes_from(&mut self, before: u64, now: u64, conversion: Option<&Conversion>) {
         if let Some(origins) = &mut self.origins {
-            origins.push(Origin { before, now, is_same: conversion == Some(&Conversion::Same) });
+            let taken = match conversion {
+                Some(Conversion::Same) => Taken::Same,
+                Some(Conversion::Wider(from, to)) => Taken::Wider(*from, *to),
+                _ => Taken::Otherwise,
+            };
+            origins.push(Origin { before, now, taken });
         }
     }
 

@@ -28,7 +28,7 @@ mod validate;
 mod visit;
 
 pub use self::carried::{
-    CarriedPath, CarriedState, Fate, Origin, Renamed, Successor, Told, WrongPair,
+    CarriedPath, CarriedState, Fate, Origin, Renamed, Successor, Taken, Told, WrongPair,
 };
 pub use self::cost::Cost;
 pub use self::edges::EdgeMemory;

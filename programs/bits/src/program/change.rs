@@ -16,7 +16,7 @@ mod times;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use understudy_typed::{Comparison, Elementary, Operation, Origin, Program};
+use understudy_typed::{Comparison, Elementary, Operation, Origin, Program, Taken};
 
 use super::{Outputs, together};
 use crate::System;
@@ -34,6 +34,9 @@ const DIFFERS: &str = "differs.";
 
 /// Attempts to follow two programs so that the values of one are those of the other.
 const ATTEMPTS: u32 = 6;
+
+/// About a value whose conversion is not followed.
+const OTHER_TYPE: &str = "has another type in the new program";
 
 /// When the new program takes the place of the old one.
 #[derive(Debug, Clone, Copy)]
@@ -219,7 +222,13 @@ impl System {
             let high = extents.get(cell.term).high;
             (high < cell.of.limits().1).then(|| i64::try_from(high).ok()).flatten()
         };
-        origins.iter().map(|(&now, origin)| (now, greatest(origin.before))).collect()
+        let is_number_kept = |origin: &Origin| match origin.taken {
+            Taken::Same => true,
+            Taken::Wider(_, to) => !to.is_real(),
+            Taken::Otherwise => false,
+        };
+        let of = |origin: &Origin| greatest(origin.before).filter(|_| is_number_kept(origin));
+        origins.iter().map(|(&now, origin)| (now, of(origin))).collect()
     }
 
     /// Begins one of the programs in a state.
@@ -337,8 +346,8 @@ impl System {
                     // A moment begins as 0.
                     return self.time(old, most);
                 };
-                if !origin.is_same {
-                    return Err("has another type in the new program");
+                if origin.taken != Taken::Same {
+                    return Err(OTHER_TYPE);
                 }
                 let from = origin.before;
                 let is_age = |holds: &Holds| matches!(holds, Holds::Age(at) if *at == from);
@@ -370,8 +379,8 @@ impl System {
                 let Some(origin) = origins.get(&address) else {
                     return Ok(initial(self));
                 };
-                if !origin.is_same {
-                    return Err("has another type in the new program");
+                if origin.taken == Taken::Otherwise {
+                    return Err(OTHER_TYPE);
                 }
                 let from = origin.before;
                 let same = |holds: &Holds| matches!(holds, Holds::Value(at, _) if *at == from);
@@ -380,8 +389,13 @@ impl System {
                         asked.want(old, from);
                     }
                 })?;
+                if let Taken::Wider(narrow, wide) = origin.taken
+                    && (self.terms.of(value), of) == (narrow, wide)
+                {
+                    return Ok(self.terms.apply(Operation::Convert(narrow, wide), wide, &[value]));
+                }
                 if self.terms.of(value) != of {
-                    return Err("has another type in the new program");
+                    return Err(OTHER_TYPE);
                 }
                 if self.most_of(value).is_some() && !self.reaches(value, most) {
                     asked.least.insert((OLD.to_owned(), from), most.unwrap_or(i64::MAX));

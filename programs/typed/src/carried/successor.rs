@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::{CarriedState, Names, Renamed, Told, Walk, partners};
 use crate::form::Program;
 use crate::scan::SCANS;
+use crate::types::Elementary;
 
 /// A value of a new program that is one of the old program, by the addresses of both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,8 +14,19 @@ pub struct Origin {
     pub before: u64,
     /// Address in the state of the new program.
     pub now: u64,
-    /// Whether it is stored alike in both.
-    pub is_same: bool,
+    /// How it becomes that of the new program.
+    pub taken: Taken,
+}
+
+/// How a value of an old program becomes one of a new program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taken {
+    /// It is stored alike in both.
+    Same,
+    /// Each value of the first type is the equal one of the second type.
+    Wider(Elementary, Elementary),
+    /// In another way, in which it can be lost, too.
+    Otherwise,
 }
 
 /// A program in the place of another one, in an online change: it takes over the values of all variables, and not of the retentive ones alone. A program
