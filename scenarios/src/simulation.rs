@@ -69,7 +69,7 @@ pub fn simulate(
                 member,
                 asked: fault.at_cycle,
             }),
-            Simulated::Plant { outputs, field } => {
+            Simulated::Plant(outputs, field) => {
                 if let Member::Plant(program) = member {
                     fields[program.index()] = Some((outputs.clone(), field.clone()));
                 }

@@ -50,13 +50,8 @@ pub enum Record<'a> {
     Station(&'a understudy_node::Event),
     /// Of a remote I/O.
     RemoteIo(&'a understudy_remote_io::Event),
-    /// A plant moved.
-    Plant {
-        /// What its actuators got, of both remote I/Os of its program together.
-        outputs: &'a Image,
-        /// What it shows then.
-        field: &'a Field,
-    },
+    /// A plant moved by what its actuators got, of both remote I/Os of its program together; what it shows then.
+    Plant(&'a Image, &'a Field),
     /// A fault was done.
     Fault(&'a Fault),
     /// Something that must never happen.

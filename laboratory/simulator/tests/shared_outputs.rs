@@ -45,7 +45,7 @@ fn run(parts: Parts, faults: &[Fault], cycles: u64) -> (Vec<(u64, f32)>, Simulat
     faults.iter().for_each(|fault| simulation.schedule(*fault));
     let mut flows = Vec::new();
     let mut observe = |_, cycle: Option<u64>, _, record: Record<'_>| {
-        if let (Some(cycle), Record::Plant { field, .. }) = (cycle, record) {
+        if let (Some(cycle), Record::Plant(_, field)) = (cycle, record) {
             flows.push((cycle, flow(&field.sensors)));
         }
     };

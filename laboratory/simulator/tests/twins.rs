@@ -36,9 +36,7 @@ fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
     let mut last: Option<Time> = None;
     let mut longest = Duration::ZERO;
     let outcome = simulation.run(cycles, 200, &mut |now, cycle, member, record| {
-        if cycle.is_some()
-            && member == Member::Plant(ROBOT)
-            && matches!(record, Record::Plant { .. })
+        if cycle.is_some() && member == Member::Plant(ROBOT) && matches!(record, Record::Plant(..))
         {
             if let Some(last) = last {
                 longest = longest.max(now.since(last));

@@ -48,7 +48,7 @@ fn run(parts: Parts, faults: &[Fault], stuck: &[Stuck], cycles: u64) -> Outcome 
     let mut observe = |now: Time, cycle: Option<u64>, member: Member, record: Record<'_>| match (
         cycle, member, record,
     ) {
-        (Some(_), Member::Plant(ROBOT), Record::Plant { .. }) => {
+        (Some(_), Member::Plant(ROBOT), Record::Plant(..)) => {
             longest = longest.max(now.since(last.replace(now).unwrap_or(now)));
         }
         (Some(cycle), FIRST | TWIN, Record::RemoteIo(event)) => {

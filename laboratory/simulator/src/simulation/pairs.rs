@@ -110,7 +110,7 @@ impl Simulation {
         self.plants.drive(program, outputs);
         if let Some(field) = self.plants.field(program) {
             let plant = Member::Plant(program);
-            observe(self.now, self.pace.cycle(), plant, Record::Plant { outputs, field });
+            observe(self.now, self.pace.cycle(), plant, Record::Plant(outputs, field));
         }
         self.show_field(program);
     }
