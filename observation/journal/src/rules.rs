@@ -39,6 +39,16 @@ impl Process {
         self == Self::Running
     }
 
+    /// Why its member does nothing, after the name of the member; nothing where it runs.
+    pub fn absence(self) -> Option<&'static str> {
+        match self {
+            Self::Running => None,
+            Self::Suspended => Some("is suspended"),
+            Self::Killed => Some("is killed"),
+            Self::Ended => Some("ended unexpectedly"),
+        }
+    }
+
     /// Whether there is no process.
     pub fn is_down(self) -> bool {
         matches!(self, Self::Killed | Self::Ended)

@@ -7,6 +7,11 @@ use crate::image::Declared;
 use crate::operation::{number_text, text_literal};
 use crate::types::{Array, Elementary, Enumeration, Type};
 
+/// Whether a name is `whole`, or names a part of it: `pump.speed` and `pump[0]` are within `pump`.
+pub fn is_within(name: &str, whole: &str) -> bool {
+    name.strip_prefix(whole).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+}
+
 /// A variable without parts, or such a part of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {

@@ -10,6 +10,7 @@ use understudy_ladder::{Executed, LowerError, Program as LadderProgram};
 use understudy_logic::Circuit;
 use understudy_typed::{
     CarriedPath, CarriedState, EdgeMemory, Fate, Program as TypedProgram, Renamed, Successor, Told,
+    is_within,
 };
 use understudy_wire::ProgramHash;
 
@@ -199,11 +200,7 @@ impl Code {
             .layout()
             .map(|layout| layout.narrowed(successor.program(), (&before.typed, before.layout())));
         for name in narrowed.into_iter().flatten() {
-            let within = |path: &CarriedPath| {
-                name.strip_prefix(&path.path)
-                    .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-            };
-            for path in paths.iter_mut().filter(|path| within(path)) {
+            for path in paths.iter_mut().filter(|path| is_within(&name, &path.path)) {
                 if matches!(path.fate, Fate::Kept | Fate::Converted) {
                     path.fate = Fate::Narrowed;
                 }

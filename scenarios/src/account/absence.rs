@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use understudy_journal::{Happening, Members, Record, RunEvent};
+use understudy_journal::{Happening, Members, Process, Record, RunEvent};
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_simulator::Action;
 use understudy_wire::Member;
 
 /// Why each of them passes no deadlines.
@@ -15,18 +14,12 @@ impl Absences {
     /// Takes the next record.
     pub(super) fn note(&mut self, record: &Record) {
         let (member, reason) = match (&record.event, record.member) {
-            (Happening::Run(RunEvent::Fault { action, member, .. }), _) => match action {
-                Action::Crash => (*member, Some("is killed")),
-                Action::Stop => (*member, Some("is suspended")),
-                Action::Continue
-                | Action::Restart
-                | Action::RestartInEpoch { .. }
-                | Action::RestartMisconfigured
-                | Action::RestartWrongProgram => (*member, None),
-                _ => return,
-            },
+            (Happening::Run(RunEvent::Fault { action, member, .. }), _) => {
+                let Some(process) = Process::after(*action) else { return };
+                (*member, process.absence())
+            }
             (Happening::Run(RunEvent::Ended { member, .. }), _) => {
-                (*member, Some("ended unexpectedly"))
+                (*member, Process::Ended.absence())
             }
             (Happening::Run(RunEvent::Started { member }), _) => (*member, None),
             (Happening::RemoteIo(event), Some(member)) => match event {

@@ -34,12 +34,11 @@ impl Model {
         driven.map_or_else(|| self.standing(step.cycle).driver(program), |driven| driven.by)
     }
 
-    /// As [`Self::driver_at`], of a cycle.
-    pub(super) fn driver_in(&self, program: ProgramId, cycle: i64) -> Member {
-        match self.deadline(program, cycle) {
-            Some(step) => self.driver_at(program, step),
-            None => self.standing(cycle).driver(program),
-        }
+    /// The name of the remote I/O that drove the outputs of a program in a cycle, as [`Self::driver_at`].
+    pub(super) fn driver_name(&self, program: ProgramId, cycle: i64) -> &str {
+        let step = self.deadline(program, cycle);
+        let own = step.map(|step| self.driver_at(program, step));
+        self.members.name(own.unwrap_or_else(|| self.standing(cycle).driver(program)))
     }
 
     /// The member as which it reports: both remote I/Os of a program report as one.

@@ -277,7 +277,7 @@ impl Model {
         cycles: RangeInclusive<i64>,
     ) -> LackingStation {
         let name = self.members.name(Member::Station(station));
-        let remote_io = self.members.name(self.driver_in(program, *cycles.end()));
+        let remote_io = self.driver_name(program, *cycles.end());
         let others = self.program_ids().filter(|other| *other != program);
         let others = others.filter_map(|other| self.heard_in(other, cycles.clone()));
         let is_received = others.map(|heard| heard.contains(station)).reduce(|any, one| any | one);
@@ -305,7 +305,7 @@ impl Model {
     ) -> LackingStation {
         let station = lacking.station;
         let name = self.members.name(Member::Station(station));
-        let remote_io = self.members.name(self.driver_in(program, *cycles.end()));
+        let remote_io = self.driver_name(program, *cycles.end());
         let mut link = None;
         let (reason, text) = match lacking.reason {
             LackingReason::NotReceived => {

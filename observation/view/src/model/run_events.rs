@@ -139,11 +139,7 @@ impl Model {
             (Action::Heal { to }, _) => self.changes.push(cycle, Change::Healed(member, to)),
             _ => {}
         }
-        let what = match Process::after(action) {
-            Some(Process::Killed) => Some("is killed"),
-            Some(Process::Suspended) => Some("is suspended"),
-            _ => None,
-        };
+        let what = Process::after(action).and_then(Process::absence);
         if let (Member::RemoteIo(program), Some(what)) = (member, what)
             && !self.is_paired(program)
         {

@@ -68,7 +68,7 @@ impl Model {
         if let Some((silence, names)) = &silent
             && lacking.iter().any(is_silent)
         {
-            let remote_io = self.members.name(self.driver_in(program, *cycles.end()));
+            let remote_io = self.driver_name(program, *cycles.end());
             let stations = listed(names);
             let (name, text) = match silence {
                 Silence::Here => (
@@ -85,7 +85,7 @@ impl Model {
             causes.push(((name.to_owned(), UNPROTECTED), text));
         }
         if causes.is_empty() {
-            let remote_io = self.members.name(self.driver_in(program, *cycles.end())).to_owned();
+            let remote_io = self.driver_name(program, *cycles.end()).to_owned();
             let text = format!("{remote_io} does not name a station that lacks");
             causes.push(((remote_io, UNPROTECTED), text));
         }

@@ -405,20 +405,20 @@ impl<'m> Explainer<'m> {
             let done = &trace.done[trace.last_write(part.address)?];
             Some((self.cycle(last), (done.routine, done.line)))
         });
-        match again {
-            None => ", and unchanged since".to_owned(),
-            Some((cycle, of)) if of == by => {
-                format!(", and again with the same value, last in cycle {cycle}")
-            }
-            Some((cycle, (routine, line))) => {
-                let routine = self.program.routine(routine);
-                let at = match self.text.declares(&routine.name) && line > 0 {
-                    true => format!("line {line}"),
-                    false => format!("the library block {}", routine.name),
-                };
-                format!(", and again with the same value, last in cycle {cycle} by {at}")
+        let Some((cycle, of)) = again else {
+            return ", and unchanged since".to_owned();
+        };
+        let mut text = format!(", and again with the same value, last in cycle {cycle}");
+        let (routine, line) = (&self.program.routine(of.0).name, of.1);
+        if of != by {
+            match (self.text.declares(routine), line) {
+                // No line of the text is that of the statement.
+                (true, 0) => {}
+                (true, _) => text += &format!(" by line {line}"),
+                (false, _) => text += &format!(" by the library block {routine}"),
             }
         }
+        text
     }
 }
 

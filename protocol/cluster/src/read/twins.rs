@@ -7,7 +7,7 @@ use understudy_remote_io::{PairedInput, PointPlace, SWITCHOVER, SharedOutputs, W
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::{Constant, key_text};
 use understudy_text::{Diagnostic, duration};
-use understudy_typed::{Elementary, Points};
+use understudy_typed::{Elementary, Points, is_within};
 
 use super::Member;
 use super::names::Names;
@@ -214,9 +214,7 @@ fn check_outputs(
 
 /// What may be meant by a name that no output has: the parts of an array or of a structure are outputs of their own.
 fn output_help(name: &str, outputs: &Points) -> String {
-    let is_part =
-        |output: &&str| output.strip_prefix(name).is_some_and(|rest| rest.starts_with(['[', '.']));
-    let parts = outputs.names().filter(is_part).take(MAXIMUM_MISFITS);
+    let parts = outputs.names().filter(|output| is_within(output, name)).take(MAXIMUM_MISFITS);
     let parts: Vec<String> = parts.map(|part| format!("{} = \"half\"", key_text(part))).collect();
     match parts.is_empty() {
         true => suggestion(name, outputs.names()),
