@@ -33,6 +33,9 @@ const INPUTS_CHANGE: Duration = Duration::from_millis(300);
 /// Time within which the connections of processes that have ended are read to their end.
 const READ_TO_END: Duration = Duration::from_secs(20);
 
+/// Time within which the kernel begins to stamp what is received.
+const STAMPS_BEGIN: Duration = Duration::from_secs(5);
+
 /// By how much the wall clock may move against the monotonic one, which orders the records of the members.
 const CLOCK_TOLERANCE_NS: u64 = 1_000_000;
 
@@ -163,28 +166,51 @@ impl Connection {
 
     /// Whether more was received.
     fn receive(&mut self) -> io::Result<bool> {
-        let mut bytes = [0; 512];
-        let mut space = cmsg_space!(TimeSpec);
-        let mut into = [IoSliceMut::new(&mut bytes)];
-        let fd = self.stream.as_raw_fd();
-        let received = loop {
-            match recvmsg::<()>(fd, &mut into, Some(&mut space), MsgFlags::empty()) {
-                Err(nix::errno::Errno::EINTR) => {}
-                other => break other?,
-            }
-        };
-        let length = received.bytes;
-        if length == 0 {
+        let (bytes, stamp) = received(&self.stream)?;
+        if bytes.is_empty() {
             return Ok(false);
         }
-        let stamp = received.cmsgs()?.find_map(|message| match message {
-            ControlMessageOwned::ScmTimestampns(stamp) => Some(stamp_ns(stamp)),
-            _ => None,
-        });
         let missing = || io::Error::new(ErrorKind::Unsupported, "the kernel stamps no time");
         self.received_ns = stamp.ok_or_else(missing)?;
-        self.buffer.extend(&bytes[..length]);
+        self.buffer.extend(bytes);
         Ok(true)
+    }
+}
+
+/// The next bytes of a connection, none where it is over, and when the kernel received them, by the wall clock.
+fn received(stream: &TcpStream) -> io::Result<(Vec<u8>, Option<u64>)> {
+    let mut bytes = [0; 512];
+    let mut space = cmsg_space!(TimeSpec);
+    let mut into = [IoSliceMut::new(&mut bytes)];
+    let received = loop {
+        match recvmsg::<()>(stream.as_raw_fd(), &mut into, Some(&mut space), MsgFlags::empty()) {
+            Err(nix::errno::Errno::EINTR) => {}
+            other => break other?,
+        }
+    };
+    let length = received.bytes;
+    let stamp = received.cmsgs()?.find_map(|message| match message {
+        ControlMessageOwned::ScmTimestampns(stamp) => Some(stamp_ns(stamp)),
+        _ => None,
+    });
+    Ok((bytes[..length].to_vec(), stamp))
+}
+
+/// Waits until the kernel stamps what the connections of this listener receive: it begins to some time after it is asked to, and what it receives before
+/// has no time.
+fn await_stamps(listener: &TcpListener) -> io::Result<()> {
+    let mut sender = TcpStream::connect(listener.local_addr()?)?;
+    let (receiver, _) = listener.accept()?;
+    let until = Instant::now() + STAMPS_BEGIN;
+    loop {
+        sender.write_all(&[0])?;
+        if let (_, Some(_)) = received(&receiver)? {
+            return Ok(());
+        }
+        if Instant::now() > until {
+            return Err(io::Error::new(ErrorKind::Unsupported, "the kernel stamps no time"));
+        }
+        std::thread::sleep(Duration::from_millis(1));
     }
 }
 
@@ -209,6 +235,7 @@ impl Device {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         // Connections inherit it.
         setsockopt(&listener, sockopt::ReceiveTimestampns, &true)?;
+        await_stamps(&listener)?;
         let device = Self {
             address: listener.local_addr()?,
             began,
