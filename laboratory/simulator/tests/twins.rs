@@ -5,8 +5,9 @@ mod press_cell;
 use std::time::Duration;
 
 use understudy_cycle::Mode;
+use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
-use understudy_wire::{Member, ProgramId, ProgramSet, StationId, Time};
+use understudy_wire::{Member, ProgramId, ProgramSet, Source, StateChoice, StationId, Time};
 
 const ROBOT: ProgramId = ProgramId(0);
 const FIRST: Member = Member::RemoteIo(ROBOT);
@@ -183,4 +184,54 @@ fn the_station_that_was_lost_with_the_author_answers_nothing() {
     ];
     let simulation = run(parts(1), &faults, 400).simulation;
     assert_eq!((simulation.asking(), simulation.author(ROBOT)), (ProgramSet::EMPTY, Some(TWIN)));
+}
+
+/// After a power failure one of the two and one station stay away, or return with a wrong program: nobody knows whether that station follows that one. The
+/// remote I/O that is alone starts, or says why it does not, and then starts as the operator chooses.
+#[test]
+fn one_that_returns_with_a_part_of_the_stations_can_be_started() {
+    let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
+    let programs = [ROBOT, ProgramId(1)];
+    let pairs = programs.map(|program| [Member::RemoteIo(program), Member::Twin(program)]);
+    let wirings: [fn(&mut Parts, u32); 2] = [press_cell::pair, press_cell::pair_parallel];
+    let cases = wirings.into_iter().flat_map(|wire| [FIRST, TWIN].map(|away| (wire, away)));
+    let cases = cases.flat_map(|(wire, away)| stations.map(|station| (wire, [away, station])));
+    for ((wire, away), place) in cases.flat_map(|case| (0..10).map(move |place| (case, place))) {
+        for returns in [None, Some(Action::RestartWrongProgram)] {
+            let phase = f64::from(place) / 10.0;
+            let mut parts = press_cell::parts(Mode::Full, 1);
+            wire(&mut parts, 1);
+            let mut simulation = Simulation::new(parts, Network::default(), 1);
+            for member in stations.into_iter().chain(pairs.concat()) {
+                simulation.schedule(fault(50, phase, member, Action::Crash));
+                let action = if away.contains(&member) { returns } else { Some(Action::Restart) };
+                if let Some(action) = action {
+                    simulation.schedule(fault(60, phase, member, action));
+                }
+            }
+            let alone = if away[0] == FIRST { TWIN } else { FIRST };
+            let (mut is_told, mut applied) = (false, [0; 2]);
+            let mut observe = |_, cycle, member, record: Record<'_>| match record {
+                Record::RemoteIo(
+                    Event::StateLost { asks: true, .. } | Event::ConfigurationDisputed { .. },
+                ) if member == alone => is_told = true,
+                Record::RemoteIo(Event::Applied {
+                    source: Source::Direct | Source::Reconstructed,
+                    ..
+                }) if member == alone && cycle > Some(60) => {
+                    applied[usize::from(cycle > Some(200))] += 1;
+                }
+                _ => {}
+            };
+            simulation.run(60, 200, &mut observe).expect("the cluster gets ready");
+            simulation.go_to(200, 0.0, &mut observe);
+            let choice = StateChoice::Cold;
+            simulation.schedule(fault(200, 0.5, alone, Action::Choose { choice }));
+            simulation.go_to(260, 0.0, &mut observe);
+            let case = format!("{away:?} are away, at {phase}, {returns:?}");
+            assert_eq!(simulation.violations(), [], "{case}");
+            assert!(is_told || applied[0] > 100, "{case}: {applied:?}");
+            assert!(applied[1] > 50, "{case}: {applied:?}");
+        }
+    }
 }

@@ -93,7 +93,7 @@ pub(super) struct Pairing {
     theirs: Option<Pair>,
     /// Deadlines for which stations are received and this one may not begin.
     refused: u32,
-    /// Whether a station that can hold the state was received in the cycle of the last deadline.
+    /// Whether a station that can hold the state was received at the last deadline, as [`Report::is_received`] has it.
     receives_stations: bool,
     /// Where both remote I/Os are wired to the plant.
     modules: Option<Modules>,
@@ -130,6 +130,11 @@ impl Report {
             Some(true) if !skipped => self.lacked_for.saturating_add(1),
             _ => 0,
         };
+    }
+
+    /// Whether it is received: in this cycle, or in the last one that it lacked samples, since a station that joins is often received after the deadline.
+    fn is_received(&self) -> bool {
+        self.lacks.is_some() || self.lacked_for > 0
     }
 
     /// Cycles in a row in which it lacked them, with the current one as far as it was received in it.

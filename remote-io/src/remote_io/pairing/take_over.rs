@@ -27,8 +27,7 @@ impl RemoteIo {
         let after = pairing.settings.take_over_after;
         let moment = self.member.moment();
         let is_idle = matches!(self.deadline, Deadline::Passed { idle: 1.. });
-        let mut reports = pairing.reports.iter();
-        pairing.receives_stations = !is_idle && reports.any(|report| report.lacks.is_some());
+        pairing.receives_stations = !is_idle && pairing.reports.iter().any(Report::is_received);
         let is_followed = pairing.followed.is_some_and(|(followed, _)| followed == moment);
         pairing.idle = match pairing.part {
             Part::TakingOver | Part::Author if !is_followed => pairing.idle.saturating_add(1),
