@@ -104,6 +104,8 @@ enum Rest {
 struct CycleNotes {
     /// Segments of wide states that it has sent.
     segments: usize,
+    /// It has sent the Sync of this cycle as well.
+    has_repeated_sync: bool,
     token: Token,
     rest: Rest,
     /// Outputs that controllers published of their own programs.
@@ -396,7 +398,8 @@ impl Station {
         let never = Time(u64::MAX);
         let copies = self.member.copies_at().unwrap_or(never);
         let publishes = self.publishes_at().unwrap_or(never);
-        let first = copies.min(publishes).min(self.asks_at().unwrap_or(never));
+        let first = [self.asks_at(), self.repeats_sync_at()].into_iter().flatten();
+        let first = first.fold(copies.min(publishes), Time::min);
         // No station starts the next cycle before the current one is over.
         let end = self.member.clock.anchor() + self.settings.agreement.schedule.period();
         if self.role != Role::Listening && first <= end {
@@ -416,6 +419,7 @@ impl Station {
     fn wake(&mut self, now: Time) {
         self.count_votes(now);
         self.member.send_copies(now);
+        self.repeat_sync_if_due(now);
         self.publish_if_due(now);
         if self.asks_at().is_some_and(|due| due <= now) {
             self.ask();

@@ -188,7 +188,7 @@ pub struct Account {
     /// Records that members could not write, because their journals were too slow.
     pub(crate) unwritten: BTreeMap<Member, u64>,
     /// How long a remote I/O took from its samples to its outputs, and how late it was woken, as it said last.
-    pub(crate) timed: BTreeMap<ProgramId, (Quantiles, Quantiles)>,
+    pub(crate) timed: BTreeMap<Member, (Quantiles, Quantiles)>,
     /// Whether the run was asked to end early.
     pub interrupted: bool,
     /// Whether everybody was synchronised in the last cycle of the scenario.
@@ -334,11 +334,8 @@ impl Account {
             (Happening::Host(HostEvent::JournalLost { records }), Some(member)) => {
                 self.unwritten(member, *records);
             }
-            (
-                Happening::Host(HostEvent::Timed { sample_to_output, wakeups }),
-                Some(Member::RemoteIo(program)),
-            ) => {
-                self.timed.insert(program, (*sample_to_output, *wakeups));
+            (Happening::Host(HostEvent::Timed { sample_to_output, wakeups }), Some(member)) => {
+                self.timed.insert(member, (*sample_to_output, *wakeups));
             }
             (
                 Happening::Host(HostEvent::Ready { .. }),
@@ -412,7 +409,7 @@ impl Account {
             && let Some(referee) = self.terms.referees.get_mut(program.index())
         {
             referee.misses_records();
-            let changes = self.alarms.fold.forget(program);
+            let changes = self.alarms.fold.forget_values_of(member);
             self.alarms_changed(&changes, None);
         }
     }

@@ -138,7 +138,8 @@ pub struct RemoteIoSummary {
     pub name: String,
     /// What it applied.
     pub counts: Counts,
-    /// From its samples to the outputs that are proved for them, since its process runs; nothing in a simulated run.
+    /// From its samples to the outputs that are proved for them, since its process runs; nothing in a simulated run. Where there are two, of the one that drove
+    /// more often.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample_to_output: Option<Quantiles>,
     /// How late the system woke it meanwhile.
@@ -341,7 +342,9 @@ impl Summary {
         let services = account.services.iter().enumerate();
         let remote_ios = services.clone().map(|(program, service)| {
             let program = ProgramId(program as u8);
-            let timed = account.timed.get(&program);
+            let both = [Member::RemoteIo(program), Member::Twin(program)];
+            let timed = both.iter().filter_map(|one| account.timed.get(one));
+            let timed = timed.max_by_key(|(taken, _)| taken.count);
             RemoteIoSummary {
                 name: name(Member::RemoteIo(program)),
                 counts: service.counts,

@@ -18,13 +18,8 @@ fn parts(founds: Moment, understudies: usize, turns: Turns) -> Parts {
     let mut parts = press_cell::parts(Mode::Full, understudies);
     for station in &mut parts.stations {
         station.founds = founds;
-        let agreement = std::sync::Arc::make_mut(&mut station.agreement);
-        agreement.schedule = agreement.schedule.clone().with_turns(turns);
     }
-    for remote_io in &mut parts.remote_ios {
-        let agreement = std::sync::Arc::make_mut(&mut remote_io.agreement);
-        agreement.schedule = agreement.schedule.clone().with_turns(turns);
-    }
+    press_cell::take_turns(&mut parts, turns);
     parts
 }
 

@@ -6,7 +6,7 @@
 
 mod press_cell;
 
-use understudy_cycle::Mode;
+use understudy_cycle::{Mode, Turns};
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation};
 use understudy_wire::{Member, ProgramId, StationId};
@@ -127,6 +127,40 @@ fn every_single_link_heals() {
             let mut cut = [0; MEMBERS];
             cut[from] = 1 << to;
             check(cut, (from * MEMBERS + to) as u64);
+        }
+    }
+}
+
+/// In a cell with few controllers nobody but the cycle master sends soon: a remote I/O that does not receive it begins its cycles with the Sync of the next
+/// rank.
+#[test]
+fn a_single_link_of_a_small_cell_costs_no_cycle() {
+    for programs in 1..=3 {
+        let stations = (0..=programs).map(|rank| Member::Station(StationId(rank as u8)));
+        let remote_ios = (0..programs).map(|program| Member::RemoteIo(ProgramId(program as u8)));
+        let members: Vec<Member> = stations.chain(remote_ios).collect();
+        let links = members.iter().flat_map(|&from| members.iter().map(move |&to| (from, to)));
+        let links = links.filter(|(from, to)| from != to);
+        let cases = links.flat_map(|link| [Turns::Token, Turns::Parallel].map(|it| (link, it)));
+        for (((from, to), turns), seed) in cases.flat_map(|it| (0..4).map(move |at| (it, at))) {
+            for ways in [&[(from, to)][..], &[(from, to), (to, from)]] {
+                let mut parts = press_cell::line(programs, Mode::Full, 1);
+                press_cell::take_turns(&mut parts, turns);
+                let mut simulation = Simulation::new(parts, Network::default(), seed);
+                let phase = seed as f64 * 0.3;
+                for &(member, to) in ways {
+                    let cut = Fault { at_cycle: 20, phase, member, action: Action::Cut { to } };
+                    simulation.schedule(cut);
+                    let action = Action::Heal { to };
+                    simulation.schedule(Fault { at_cycle: 60, action, ..cut });
+                }
+                simulation.run(100, 100, &mut |_, _, _, _| {}).expect("the cluster gets ready");
+                let what = format!("{programs} programs, {ways:?}, {turns:?} at {phase}");
+                assert_eq!(simulation.violations(), [], "{what}");
+                for tally in simulation.tallies() {
+                    assert_eq!(tally.held + tally.fail_safe, 0, "{what}");
+                }
+            }
         }
     }
 }

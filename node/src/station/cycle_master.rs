@@ -90,14 +90,39 @@ impl Station {
             let listens = schedule.period() * agreement.listen_cycles;
             return self.started + listens + schedule.guard() * u32::from(own.0);
         }
-        let all = StationSet::first(schedule.stations());
-        let living = all.without(self.member.flagged());
+        let living = self.living();
         let first = if self.publishes() {
             living.and(lower)
         } else {
             living.or(self.joining.and(lower)).without(StationSet::only(own))
         };
         self.member.clock.anchor() + schedule.period() + schedule.guard() * first.len() as u32
+    }
+
+    fn living(&self) -> StationSet {
+        let all = StationSet::first(self.settings.agreement.schedule.stations());
+        all.without(self.member.flagged())
+    }
+
+    /// Time at which this station repeats the Sync of the cycle master: it is the next rank, and lacks a sample. A remote I/O that does not receive the cycle
+    /// master begins the cycle with this Sync; the turns of those that wait for its sample would come too late.
+    pub(super) fn repeats_sync_at(&self) -> Option<Time> {
+        let lower = self.living().and(StationSet::first(self.own().index()));
+        let lacks_sample = || self.replicas.iter().any(|replica| !self.has_sample(replica.id()));
+        let repeats = self.role == Role::Following
+            && !self.cycle.has_repeated_sync
+            && self.publishes()
+            && lower.len() == 1
+            && lacks_sample();
+        let guard = self.settings.agreement.schedule.guard();
+        repeats.then(|| self.member.clock.anchor() + guard)
+    }
+
+    pub(super) fn repeat_sync_if_due(&mut self, now: Time) {
+        if self.repeats_sync_at().is_some_and(|due| due <= now) {
+            self.cycle.has_repeated_sync = true;
+            self.member.send_cyclic(now, Body::Sync);
+        }
     }
 
     pub(super) fn start_cycle(&mut self, now: Time, planned: Time) {

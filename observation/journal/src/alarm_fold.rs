@@ -120,10 +120,9 @@ impl AlarmFold {
                 Happening::RemoteIo(event),
                 Some(member @ (Member::RemoteIo(program) | Member::Twin(program))),
             ) => self.remote_io(member, program, cycle, event),
-            (
-                Happening::Host(HostEvent::JournalLost { .. }),
-                Some(Member::RemoteIo(program) | Member::Twin(program)),
-            ) => self.forget(program),
+            (Happening::Host(HostEvent::JournalLost { .. }), Some(member)) => {
+                self.forget_values_of(member)
+            }
             (Happening::Run(event), _) => self.run(event),
             _ => Vec::new(),
         }
@@ -221,18 +220,25 @@ impl AlarmFold {
             }
             _ => return Vec::new(),
         };
-        let Some(program) = member.sampled_program() else {
+        let Some(program) = self.program_driven_by(*member) else {
             return Vec::new();
         };
-        let Some(track) = self.tracks.get_mut(program.index()) else {
-            return Vec::new();
-        };
-        // The end of a follower changes nothing.
-        if track.author.unwrap_or(Member::RemoteIo(program)) != *member {
-            return Vec::new();
+        if let Some(track) = self.tracks.get_mut(program.index()) {
+            track.silent = is_silent;
         }
-        track.silent = is_silent;
         if is_silent { self.forget(program) } else { Vec::new() }
+    }
+
+    /// The program whose outputs a member drives: a follower drives none.
+    fn program_driven_by(&self, member: Member) -> Option<ProgramId> {
+        let program = member.sampled_program()?;
+        let author = self.tracks.get(program.index())?.author;
+        (author.unwrap_or(Member::RemoteIo(program)) == member).then_some(program)
+    }
+
+    /// What a member reports is not known until its next reports; nothing changes where it is a follower.
+    pub fn forget_values_of(&mut self, member: Member) -> Vec<AlarmChange> {
+        self.program_driven_by(member).map_or_else(Vec::new, |program| self.forget(program))
     }
 
     /// The values of a program are unknown until the next ones.

@@ -1,9 +1,10 @@
 //! The press cell of section V as parts of a simulation.
 #![allow(dead_code, reason = "each test uses a part of it")]
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::Mode;
+use understudy_cycle::{Mode, Turns};
 use understudy_remote_io::{PairSettings, PairedInput, Wiring};
 use understudy_simulator::Parts;
 use understudy_wire::{Member, ProgramId, StationId};
@@ -35,6 +36,16 @@ pub(crate) fn pair(parts: &mut Parts, take_over_after: u32) {
 pub(crate) fn pair_parallel(parts: &mut Parts, take_over_after: u32) {
     let wiring = Wiring::Parallel { discrepancy_cycles: DISCREPANCY_CYCLES };
     pair_as(parts, PairSettings { wiring, ..PairSettings::exclusive(take_over_after) });
+}
+
+/// The same stations and remote I/Os with these turns.
+pub(crate) fn take_turns(parts: &mut Parts, turns: Turns) {
+    let stations = parts.stations.iter_mut().map(|it| &mut it.agreement);
+    let remote_ios = parts.remote_ios.iter_mut().map(|it| &mut it.agreement);
+    for agreement in stations.chain(remote_ios) {
+        let agreement = Arc::make_mut(agreement);
+        agreement.schedule = agreement.schedule.clone().with_turns(turns);
+    }
 }
 
 fn pair_as(parts: &mut Parts, pair: PairSettings) {

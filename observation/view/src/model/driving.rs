@@ -49,7 +49,7 @@ impl Model {
         self.find_complete();
     }
 
-    /// The values at a remote I/O that does not report are not known, and neither are the alarms on them.
+    /// The values at a remote I/O that does not report are not known, and neither are the alarms on them. Both remote I/Os of a program report as the first.
     fn values_unknown(&mut self, member: Member, cycle: i64) {
         if let Member::RemoteIo(program) = member {
             let changes = self.process_alarms.fold.forget(program);

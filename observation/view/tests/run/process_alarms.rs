@@ -65,8 +65,20 @@ const KILLED: &str = "title = \"a ramp\"\ncycles = 300\n\
     [[step]]\nat = 180\naction = \"crash\"\nstation = \"keep-io\"\n\
     [[step]]\nat = 220\naction = \"restart\"\nstation = \"keep-io\"\n";
 
+/// The first remote I/O is killed and returns: its twin drives from cycle 102 on.
+const TAKEN_OVER: &str = "title = \"a ramp\"\ncycles = 300\n\
+    [[step]]\nat = 100\naction = \"crash\"\nstation = \"keep-io\"\n\
+    [[step]]\nat = 120\naction = \"restart\"\nstation = \"keep-io\"\n";
+
+const TWINS: &str = "[[remote_io]]\nname = \"keep-io\"\ncontroller = \"keep\"\n\
+    twin = { name = \"keep-io-2\", wiring = \"exclusive\" }\n";
+
 pub(crate) fn ramp() -> Cluster {
-    let loaded = read_with("cluster.toml", CLUSTER, Overrides::default(), &mut |name| match name {
+    cluster(CLUSTER)
+}
+
+fn cluster(text: &str) -> Cluster {
+    let loaded = read_with("cluster.toml", text, Overrides::default(), &mut |name| match name {
         "keep.st" => Ok(KEEP.to_owned()),
         "ramp.st" => Ok(RAMP.to_owned()),
         _ => Err("no such file".to_owned()),
@@ -232,6 +244,26 @@ fn without_its_remote_io_an_alarm_is_unknown() {
     });
     assert!(unknown.count() > 20);
     assert_ne!(state_at(&model, 290, "high"), AlarmState::Unknown);
+}
+
+/// The records of one of two remote I/Os end: the alarms are unknown where it is the one that drives, and only there.
+#[test]
+fn without_the_twin_that_drives_an_alarm_is_unknown() {
+    let cluster = cluster(&format!("{CLUSTER}\n{TWINS}"));
+    let records = records(&cluster, &scenario(&cluster, TAKEN_OVER), 1);
+    let whole = model_of(&cluster, &records);
+    assert_ne!(state_at(&whole, 290, "high"), AlarmState::Unknown);
+    for (name, is_known) in [("keep-io", true), ("keep-io-2", false)] {
+        let from = records
+            .iter()
+            .position(|record| record.name == "keep-io-2" && record.at_ns > 1_500_000_000);
+        let (before, after) = records.split_at(from.expect("it reports"));
+        let after = after.iter().filter(|record| record.name != name);
+        let kept: Vec<Record> = before.iter().chain(after).cloned().collect();
+        let model = model_of(&cluster, &kept);
+        let state = state_at(&model, 290, "high");
+        assert_eq!(state != AlarmState::Unknown, is_known, "{name} is silent: {state:?}");
+    }
 }
 
 #[test]
