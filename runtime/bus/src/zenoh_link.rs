@@ -53,15 +53,18 @@ const PULSE: Duration = Duration::from_millis(250);
 const RUNTIME: &str = "ZENOH_RUNTIME";
 
 /// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
-/// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do. Over two networks there are
-/// two of each, so that what waits in the session of a network that has failed does not hold up the other one.
-pub fn zenoh_runtime(has_two_networks: bool) -> (&'static str, &'static str) {
-    let threads = match has_two_networks {
-        false => {
+/// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do. Over several paths there are as
+/// many of each, so that what waits in the session of a network that has failed does not hold up the others.
+pub fn zenoh_runtime(paths: usize) -> (&'static str, &'static str) {
+    let threads = match paths {
+        0 | 1 => {
             "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 1))"
         }
-        true => {
+        2 => {
             "(rx: (worker_threads: 2), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 2))"
+        }
+        _ => {
+            "(rx: (worker_threads: 3), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 3))"
         }
     };
     (RUNTIME, threads)
@@ -129,7 +132,7 @@ impl ZenohLink {
             publishers: Arc::clone(&publishers),
             published: Arc::clone(&published),
             ears,
-            silence: Silence::new(clock.now(), place, endpoints.is_one_of_two()),
+            silence: Silence::new(clock.now(), place, endpoints.is_one_of_several()),
             lingering: Lingering::new()
                 .map_err(|source| BusError::System { what: "a pair of sockets", source })?,
             failed: false,
@@ -476,6 +479,7 @@ mod tests {
             name: name(member),
             address,
             second: None,
+            link: None,
         });
         let peers: Vec<Peer> = peers.collect();
         let endpoints = |own| {

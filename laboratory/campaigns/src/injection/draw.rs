@@ -272,7 +272,7 @@ impl Draw<'_> {
             }
             Kind::Isolation => cuts(&self.others(member), member, phase, from, to),
             Kind::NetworkFailure => {
-                let network = Via::BOTH[self.random.random_range(0..2)];
+                let network = Via::NETWORKS[self.random.random_range(0..2)];
                 let all = self.random.random_range(0..2) == 0;
                 let mut struck = vec![member];
                 struck.extend(self.others(member).into_iter().filter(|_| all));
