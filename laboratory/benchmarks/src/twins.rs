@@ -18,7 +18,7 @@ use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Members, RunEvent, records_of};
 use understudy_remote_io::{Event, SWITCHOVER};
 use understudy_scenarios::{Action, Fault, Scenario};
-use understudy_wire::{Image, Member, ProgramId, SignalPlace, StationId, Via};
+use understudy_wire::{Image, Member, ProgramId, SignalPlace, Source, StationId, Via};
 
 use device::{Device, Recorded, TIMEOUT};
 use judge::{Found, Outputs, Rule, Write, judge, longest_gap};
@@ -64,6 +64,9 @@ const UNRECORDED: u32 = 20;
 
 /// Cycles from the end of one fault to the next: enough for a new connection to the device and a synchronised station.
 const RECOVERY_CYCLES: f64 = 80.0;
+
+/// Periods from a question of a remote I/O to the answer of the operator: before the next fault.
+const ANSWER_CYCLES: u32 = 30;
 
 /// Cycles from a kill to the restart, and of a cut.
 const DOWN_CYCLES: f64 = 20.0;
@@ -258,8 +261,10 @@ struct Row {
     unrecorded: u64,
     /// Reports that the input modules of a program differ, which they do not.
     input_alarms: u64,
-    /// Questions to the operator, who does not answer here: the program is not executed from then on.
+    /// Questions to the operator, who answers each after a time: the outputs are held and then fail-safe meanwhile.
     questions: u64,
+    /// Questions of programs that were not executed again.
+    unanswered: u64,
     /// Longest time without a write to the devices of a program, in periods.
     longest_gap_cycles: f64,
     /// Longest time that a device took to answer, in periods: a remote I/O gives up one that does not answer within its `timeout`.
@@ -273,6 +278,13 @@ struct OfProgram {
     driven: Vec<Outputs>,
     input_alarms: u64,
     questions: u64,
+    /// Whether a question was the last that was heard of the program.
+    is_asking: bool,
+}
+
+/// Whether outputs of the program were applied, and not those of a remote I/O without it.
+fn is_proved(event: &Event) -> bool {
+    matches!(event, Event::Applied { source: Source::Direct | Source::Reconstructed, .. })
 }
 
 /// What the members of a run have recorded: of each program, and when processes have ended.
@@ -303,12 +315,14 @@ fn recorded(directory: &Path, cluster: &Cluster) -> Result<(Vec<OfProgram>, Vec<
                 if let Some(image) = event.driven() {
                     let coils = coils(program, image);
                     of_program.driven.push(Outputs { at_ns: record.at_ns, coils });
+                    of_program.is_asking &= !is_proved(event);
                 }
                 let is_alarm =
                     matches!(event, Event::InputsDiffer { .. } | Event::InputExcluded { .. });
                 of_program.input_alarms += u64::from(is_alarm);
                 let is_question = matches!(event, Event::StateLost { asks: true, .. });
                 of_program.questions += u64::from(is_question);
+                of_program.is_asking |= is_question;
             }
             _ => {}
         }
@@ -382,13 +396,16 @@ fn row(
     console: &mut Console,
 ) -> Result<Row, Answer> {
     let cell = ClusterRun::of_file(file.to_owned(), &arguments.run)?;
-    let scenario = scenario(&cell.cluster, of, count, random).shortened(arguments.run.cycles);
+    let period = cell.cluster.agreement().schedule.period();
+    let answer_after = arguments.run.answer_after.or(Some(period * ANSWER_CYCLES));
+    let run = RunArguments { answer_after, ..arguments.run.clone() };
+    let scenario = scenario(&cell.cluster, of, count, random).shortened(run.cycles);
     console.note(&scenario.title);
     let failed = |error: std::io::Error| Answer::failed(Status::Failed, "U0602", error);
     for device in devices.into_iter().flatten().flatten() {
         device.take().map_err(failed)?;
     }
-    let (summary, judged) = cell.judged(&scenario, &arguments.run, console)?;
+    let (summary, judged) = cell.judged(&scenario, &run, console)?;
     if let Some(failure) = judged.failure {
         return Err(Answer::failed(Status::Failed, failure.code(), &failure));
     }
@@ -398,7 +415,6 @@ fn row(
     }
     keep_writes(cell.path(), &taken).map_err(failed)?;
     let sum = |of: fn(&Recorded) -> u64| taken.as_flattened().iter().map(of).sum();
-    let period = cell.cluster.agreement().schedule.period();
     let ns = |periods: u32| u64::try_from((period * periods).as_nanos()).unwrap_or(u64::MAX);
     let rule = Rule {
         oldest: ns(arguments.take_over_after + SWITCHOVER + 1 + UNDER_WAY),
@@ -435,6 +451,7 @@ fn row(
         unrecorded: found.iter().map(|it| it.unrecorded).sum(),
         input_alarms: programs.iter().map(|it| it.input_alarms).sum(),
         questions: programs.iter().map(|it| it.questions).sum(),
+        unanswered: programs.iter().map(|it| u64::from(it.is_asking)).sum(),
         longest_gap_cycles: longest as f64 / period.as_nanos() as f64,
         slowest_answer_cycles: slowest as f64 / period.as_nanos() as f64,
     })
@@ -442,7 +459,7 @@ fn row(
 
 fn answer(rows: &[Row]) -> Answer {
     let mut text = format!(
-        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>12} {:>15}\n",
+        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>10} {:>12} {:>15}\n",
         "fault",
         "count",
         "wrong",
@@ -456,13 +473,14 @@ fn answer(rows: &[Row]) -> Answer {
         "unrecorded",
         "input alarms",
         "questions",
+        "unanswered",
         "longest gap",
         "slowest answer"
     );
     for row in rows {
         let _ = writeln!(
             text,
-            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>12.1} {:>15.1}",
+            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>10} {:>12.1} {:>15.1}",
             row.fault,
             row.count,
             row.wrong,
@@ -476,6 +494,7 @@ fn answer(rows: &[Row]) -> Answer {
             row.unrecorded,
             row.input_alarms,
             row.questions,
+            row.unanswered,
             row.longest_gap_cycles,
             row.slowest_answer_cycles
         );
@@ -483,9 +502,10 @@ fn answer(rows: &[Row]) -> Answer {
             let _ = writeln!(text, "    {violation}");
         }
     }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\na program of which a question is asked is not executed until the end of its row;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
-    let is_right =
-        |row: &Row| (row.wrong, row.by_two, row.unproved, row.input_alarms) == (0, 0, 0, 0);
+    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nan operator answers each question after 30 periods, or after --answer-after; unanswered are programs that were not executed again;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
+    let is_right = |row: &Row| {
+        (row.wrong, row.by_two, row.unproved, row.input_alarms, row.unanswered) == (0, 0, 0, 0, 0)
+    };
     let passed = rows.iter().all(is_right);
     let status = if passed { Status::Done } else { Status::Failed };
     Answer::done(text, rows).with_status(status)
