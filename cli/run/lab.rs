@@ -56,7 +56,7 @@ pub struct RunArguments {
     /// Restart members that end unexpectedly: after 0.5 s, after up to 8 s if they end repeatedly
     #[arg(long)]
     pub restart: bool,
-    /// Answer each question of a remote I/O after this time, such as 200ms: accept the newest state, or start cold where no station holds one
+    /// Answer each question of a remote I/O after this time: accept the newest state, or start cold if there is none
     #[arg(long, value_name = "TIME", value_parser = parse_positive)]
     pub answer_after: Option<Duration>,
     /// Overrides of the cluster file.

@@ -88,7 +88,7 @@ fn separated_by_networks(name: &str, link: &str, more: &[&str]) {
     for record in records {
         let is_of_robot = record["name"].as_str().is_some_and(|name| name.starts_with("robot"));
         match record["event"]["event"].as_str() {
-            Some("fault") if record["event"]["action"]["action"] == "crash" => break,
+            Some("fault") if record["event"]["action"] == "crash" => break,
             Some("partner-lost") if is_of_robot => is_lost = true,
             Some("partner-received") if is_of_robot => is_lost = false,
             _ => {}
