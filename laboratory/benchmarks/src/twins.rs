@@ -1,6 +1,6 @@
 //! `understudy-bench twins`: a cell of two networks, an understudy and twins on Modbus devices that record each write. Processes are killed and
 //! suspended, and networks cut, at random phases of the cycle, one or two at once. With `--hosts netns` each machine has a namespace and each network a
-//! bridge, and cables are pulled; the plants are simulated then, since a namespace does not reach the devices of this process.
+//! bridge, and cables are pulled, also that of a direct link; the plants are simulated then, since a namespace does not reach the devices of this process.
 
 mod device;
 mod judge;
@@ -35,6 +35,9 @@ pub(crate) struct Arguments {
     /// How the two remote I/Os of a program are connected to the plant
     #[arg(long, value_enum, default_value = "exclusive")]
     wiring: Wiring,
+    /// Join the two remote I/Os of each program by a direct link, which fails as a network does
+    #[arg(long)]
+    direct_link: bool,
     /// Folder for the files of the cell
     #[arg(long, value_name = "DIR", default_value = "twins-bench")]
     folder: PathBuf,
@@ -116,9 +119,11 @@ fn fault(cluster: &Cluster, of: Target, begin: f64, random: &mut Pcg64Mcg) -> (V
         action,
     };
     if of == Target::Networks {
-        let network = if random.random() { Via::First } else { Via::Second };
+        let paths = if cluster.direct_links().is_empty() { 2 } else { 3 };
+        let network = Via::ALL[random.random_range(0..paths)];
         let end = begin + DOWN_CYCLES;
-        let all = cluster.members().flat_map(|member| {
+        let on = cluster.members().filter(|it| cluster.paths(*it).any(|via| via == network));
+        let all = on.flat_map(|member| {
             let cut = step(begin, member, Action::Unplug { network });
             [cut, step(end, member, Action::Plug { network })]
         });
@@ -188,7 +193,7 @@ type Devices = [[Device; 2]; 2];
 
 /// The cluster file, with the devices of its programs, or with simulated plants.
 fn files(arguments: &Arguments, devices: Option<&Devices>) -> std::io::Result<PathBuf> {
-    let Arguments { folder, take_over_after, wiring, .. } = arguments;
+    let Arguments { folder, take_over_after, wiring, direct_link, .. } = arguments;
     let mut text = "[cluster]\nname = \"twins\"\nperiod = \"10ms\"\nnetworks = 2\n".to_owned();
     for name in ["left", "right"] {
         let _ = writeln!(text, "[[controller]]\nname = \"{name}\"\nladder = \"robot.ladder\"");
@@ -208,7 +213,7 @@ fn files(arguments: &Arguments, devices: Option<&Devices>) -> std::io::Result<Pa
         let _ = writeln!(
             text,
             "[[remote_io]]\nname = \"{name}-io\"\ncontroller = \"{name}\"\n\
-             twin = {{ name = \"{name}-io-2\", wiring = \"{kind}\"{modbus}, take_over_after = {take_over_after} }}"
+             twin = {{ name = \"{name}-io-2\", wiring = \"{kind}\"{modbus}, take_over_after = {take_over_after}, direct_link = {direct_link} }}"
         );
         let Some([device, _]) = pair else {
             let watchdog = take_over_after + SWITCHOVER + 1;
