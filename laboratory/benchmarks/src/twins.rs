@@ -4,6 +4,7 @@
 
 mod device;
 mod judge;
+mod row;
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,7 +13,6 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use serde::Serialize;
 use understudy::{Answer, ClusterRun, Console, RunArguments, Status};
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Members, RunEvent, records_of};
@@ -22,6 +22,7 @@ use understudy_wire::{Image, Member, ProgramId, SignalPlace, Source, StationId, 
 
 use device::{Device, Recorded, TIMEOUT};
 use judge::{Found, Outputs, Rule, Write, judge, longest_gap};
+use row::{Row, answer};
 
 /// Kill and suspend members of a cell with twins and cut its networks, in front of devices that record who writes them
 #[derive(Debug, Args)]
@@ -238,44 +239,6 @@ fn files(arguments: &Arguments, devices: Option<&Devices>) -> std::io::Result<Pa
     Ok(file)
 }
 
-/// Result of the faults of one kind.
-#[derive(Debug, Serialize)]
-struct Row {
-    fault: &'static str,
-    count: u32,
-    directory: String,
-    /// Wrong outputs, and what else must not happen.
-    wrong: u64,
-    /// What it was.
-    violations: Vec<String>,
-    /// Deadlines with the last true output.
-    held: u64,
-    /// Deadlines with the fail-safe output.
-    fail_safe: u64,
-    /// Held and fail-safe deadlines during host stalls.
-    by_stall: u64,
-    /// Writes that the devices received.
-    writes: u64,
-    /// Connections that have written.
-    writers: u64,
-    /// Writes to a device by a connection after a later one had written.
-    by_two: u64,
-    /// Writes of outputs that no author has driven lately.
-    unproved: u64,
-    /// The same around the end of a process, whose last records are lost.
-    unrecorded: u64,
-    /// Reports that the input modules of a program differ, which they do not.
-    input_alarms: u64,
-    /// Questions to the operator, who answers each after a time: the outputs are held and then fail-safe meanwhile.
-    questions: u64,
-    /// Questions of programs that were not executed again.
-    unanswered: u64,
-    /// Longest time without a write to the devices of a program, in periods.
-    longest_gap_cycles: f64,
-    /// Longest time that a device took to answer, in periods: a remote I/O gives up one that does not answer within its `timeout`.
-    slowest_answer_cycles: f64,
-}
-
 /// What the members of a run have recorded of the outputs of one program.
 #[derive(Debug, Default)]
 struct OfProgram {
@@ -460,58 +423,4 @@ fn row(
         longest_gap_cycles: longest as f64 / period.as_nanos() as f64,
         slowest_answer_cycles: slowest as f64 / period.as_nanos() as f64,
     })
-}
-
-fn answer(rows: &[Row]) -> Answer {
-    let mut text = format!(
-        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>10} {:>12} {:>15}\n",
-        "fault",
-        "count",
-        "wrong",
-        "held",
-        "fail-safe",
-        "by stall",
-        "writes",
-        "writers",
-        "two writers",
-        "unproved",
-        "unrecorded",
-        "input alarms",
-        "questions",
-        "unanswered",
-        "longest gap",
-        "slowest answer"
-    );
-    for row in rows {
-        let _ = writeln!(
-            text,
-            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>10} {:>12.1} {:>15.1}",
-            row.fault,
-            row.count,
-            row.wrong,
-            row.held,
-            row.fail_safe,
-            row.by_stall,
-            row.writes,
-            row.writers,
-            row.by_two,
-            row.unproved,
-            row.unrecorded,
-            row.input_alarms,
-            row.questions,
-            row.unanswered,
-            row.longest_gap_cycles,
-            row.slowest_answer_cycles
-        );
-        for violation in &row.violations {
-            let _ = writeln!(text, "    {violation}");
-        }
-    }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\nan operator answers each question after 30 periods, or after --answer-after; unanswered are programs that were not executed again;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
-    let is_right = |row: &Row| {
-        (row.wrong, row.by_two, row.unproved, row.input_alarms, row.unanswered) == (0, 0, 0, 0, 0)
-    };
-    let passed = rows.iter().all(is_right);
-    let status = if passed { Status::Done } else { Status::Failed };
-    Answer::done(text, rows).with_status(status)
 }

@@ -172,18 +172,12 @@ impl<'a, 't> Fields<'a, 't> {
         Addresses {
             first: self.address("address", diagnostics),
             second: self.address("second_address", diagnostics),
-            link: self.optional_address("link_address", diagnostics),
+            link: self
+                .section
+                .knows("link_address")
+                .then(|| self.address("link_address", diagnostics))
+                .flatten(),
         }
-    }
-
-    /// An address that only some tables have.
-    fn optional_address(
-        &self,
-        name: &'static str,
-        diagnostics: &mut Vec<Diagnostic>,
-    ) -> Option<Placed<SocketAddr>> {
-        let is_known = self.section.keys.iter().any(|key| key.name == name);
-        is_known.then(|| self.address(name, diagnostics)).flatten()
     }
 
     fn address(

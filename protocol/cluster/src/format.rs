@@ -419,6 +419,11 @@ impl Section {
         keys.find(|key| key.name == name).expect("the reader asks for keys of the table only")
     }
 
+    /// Whether it has a key.
+    pub(crate) fn knows(&self, name: &str) -> bool {
+        self.keys.iter().any(|key| key.name == name)
+    }
+
     /// What holds where a count is absent; 0 for a key that is none.
     pub(crate) fn default_count(&'static self, name: &str) -> u32 {
         match self.key(name).kind {

@@ -41,6 +41,8 @@ use crate::linger::Lingering;
 use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
 use settings::{identity, settings};
+
+pub use settings::{zenoh_runtime, zenoh_runtime_of_follower};
 use silence::{Silence, Silent};
 
 /// Datagrams that wait for the cycle's thread, at most; one of 72 stations and 64 remote I/Os hears fewer in a cycle.
@@ -48,33 +50,6 @@ const QUEUE_FRAMES: usize = 1024;
 
 /// How often each member publishes something.
 const PULSE: Duration = Duration::from_millis(250);
-
-/// The variable of the environment that sets up Zenoh's own threads.
-const RUNTIME: &str = "ZENOH_RUNTIME";
-
-/// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
-/// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do. Over several paths there are as
-/// many of each, so that what waits in the session of a network that has failed does not hold up the others.
-pub fn zenoh_runtime(paths: usize) -> (&'static str, &'static str) {
-    let threads = match paths {
-        0 | 1 => {
-            "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 1))"
-        }
-        2 => {
-            "(rx: (worker_threads: 2), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 2))"
-        }
-        _ => {
-            "(rx: (worker_threads: 3), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 3))"
-        }
-    };
-    (RUNTIME, threads)
-}
-
-/// The same for a process that only follows members, such as a spare: one thread for everything, since each packet wakes every thread that handles it.
-pub fn zenoh_runtime_of_follower() -> (&'static str, &'static str) {
-    let threads = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), app: (handover: net), net: (worker_threads: 1))";
-    (RUNTIME, threads)
-}
 
 /// A session that closes is waited for so long, at most.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);

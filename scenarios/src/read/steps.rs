@@ -344,7 +344,7 @@ impl Reader<'_> {
         Some(both.collect())
     }
 
-    /// One action for the cable of this member to a network, or of the direct link to the other remote I/O of its program; with `others`, one for each of the others too.
+    /// One action for the cable of this member to a network, or for its direct link; with `others`, one for each of the others too.
     fn cable(
         &mut self,
         fields: &mut Fields<'_, '_>,
