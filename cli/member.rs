@@ -113,10 +113,11 @@ fn run(
     member: fn(&Cluster, &MemberOptions) -> Result<(), MemberError>,
 ) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
+    let found = find(&cluster, &arguments.name)?;
     if link_kind(&cluster) == LinkKind::Zenoh {
-        restart_for_zenoh(zenoh_runtime(cluster.has_two_networks()));
+        restart_for_zenoh(zenoh_runtime(cluster.paths(found).count()));
     }
-    if !is_wanted(find(&cluster, &arguments.name)?) {
+    if !is_wanted(found) {
         return Err(failed(&MemberError::WrongKind {
             name: arguments.name.clone(),
             wanted,

@@ -358,12 +358,12 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let keys = OperatorKeys::load(keys, &cluster, Date::of(SystemTime::now()));
     let keys = keys.map_err(|errors| crate::deployment::keys::failed(&errors))?;
     let member = crate::member::find(&cluster, &arguments.name)?;
-    let Addresses { first, second } = cluster.addresses(member);
+    let Addresses { first, second, .. } = cluster.addresses(member);
     let address = first.ok_or_else(|| {
         let message = format!("no address for {}", arguments.name);
         Answer::failed(Status::BadInput, "U0608", message)
     })?;
-    let peer = Peer { member, name: arguments.name.clone(), address, second };
+    let peer = Peer { member, name: arguments.name.clone(), address, second, link: None };
     let hash = cluster.agreement().cluster;
     let tls = tls_keys(&keys.tls);
     let configuration = cluster.agreement().configuration;

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
@@ -13,6 +14,7 @@ use understudy_processes::{
     run_commanded,
 };
 use understudy_scenarios::{ResultsError, Scenario, Summary, World, write_results};
+use understudy_text::duration::parse_positive;
 use understudy_wire::Via;
 
 use crate::answer::{Answer, Status};
@@ -54,6 +56,9 @@ pub struct RunArguments {
     /// Restart members that end unexpectedly: after 0.5 s, after up to 8 s if they end repeatedly
     #[arg(long)]
     pub restart: bool,
+    /// Answer each question of a remote I/O after this time: accept the newest state, or start cold if there is none
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
+    pub answer_after: Option<Duration>,
     /// Overrides of the cluster file.
     #[command(flatten)]
     pub overrides: OverrideArguments,
@@ -95,8 +100,9 @@ enum HostArgument {
 }
 
 fn parse_network(text: &str) -> Result<Via, String> {
-    let number: u8 = text.parse().map_err(|_| format!("{text:?} is not 1 or 2"))?;
-    Via::try_from(number).map_err(|error| error.to_string())
+    let number = text.parse::<u8>().ok();
+    let network = Via::NETWORKS.into_iter().find(|via| via.network() == number);
+    network.ok_or_else(|| format!("{text:?} is not 1 or 2"))
 }
 
 impl NetworkArguments {
@@ -183,6 +189,7 @@ pub(crate) fn laboratory_settings(
         network,
         journal_limit_bytes: JOURNAL_LIMIT_BYTES,
         deaths: Deaths::EndTheRun,
+        answers_after: None,
     })
 }
 
@@ -254,6 +261,7 @@ pub(crate) fn judged(
     let settings = LaboratorySettings {
         journal_limit_bytes: arguments.journal_limit,
         deaths: if arguments.restart { Deaths::Restarted } else { Deaths::Survived },
+        answers_after: arguments.answer_after,
         ..laboratory_settings(cluster, cluster_file, &arguments.overrides, network)?
     };
     let served = page.map(|page| page.beside(directory.path(), console));

@@ -53,6 +53,7 @@ pub(crate) static STEP: Table = Table {
         key("to", Kind::OneOrMany(&Kind::Text)),
         key("both_ways", Kind::Flag),
         key("network", Kind::Count(1, 2)),
+        key("direct_link", Kind::Flag),
         key("others", Kind::Flag),
         key("by", Kind::Time(Duration::ZERO, MAXIMUM_SLOWNESS)),
         key("frames", Kind::Count(1, MAXIMUM_NUMBER)),

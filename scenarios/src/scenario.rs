@@ -154,7 +154,7 @@ pub(crate) fn action_text(member: Member, action: Action, members: &Members) -> 
         }
         Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", members.name(to)),
         Action::Unplug { network } | Action::Plug { network } => {
-            format!("{word} network {network}")
+            format!("{word} {network}")
         }
         Action::Delay { to, by } => format!("{word} to {} by {by:?}", members.name(to)),
         Action::RestartInEpoch { epoch } => format!("{word} {epoch}"),

@@ -6,7 +6,7 @@ use understudy_text::duration;
 
 use understudy_journal::{Members, source_word};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Member, StationId};
+use understudy_wire::{Member, StationId, Via};
 
 use crate::scenario::{Expectation, Scenario, action_word, set, set_value, written};
 
@@ -45,8 +45,8 @@ fn write_network(text: &mut String, disturbance: &Disturbance) {
     for (key, share) in shares.into_iter().filter(|(_, share)| *share > 0.0) {
         let _ = writeln!(text, "{key} = {share:?}");
     }
-    if let Some(via) = network.over {
-        let _ = writeln!(text, "network = {via}");
+    if let Some(number) = network.over.and_then(Via::network) {
+        let _ = writeln!(text, "network = {number}");
     }
     if network.latency != usual.latency {
         let _ = writeln!(text, "latency = {}", time(network.latency));
@@ -90,9 +90,10 @@ fn write_step(text: &mut String, step: &Fault, members: &Members) {
             }
         }
         Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),
-        Action::Unplug { network } | Action::Plug { network } => {
-            writeln!(text, "network = {network}")
-        }
+        Action::Unplug { network } | Action::Plug { network } => match network.network() {
+            Some(number) => writeln!(text, "network = {number}"),
+            None => writeln!(text, "direct_link = true"),
+        },
         Action::Delay { to, by } => {
             writeln!(text, "to = {}\nby = {}", name(to), time(by))
         }

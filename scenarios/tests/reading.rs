@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use insta::assert_snapshot;
 use understudy_cycle::Mode;
 use understudy_journal::Members;
-use understudy_scenarios::{looks_like_a_scenario, read, write};
+use understudy_scenarios::{Action, looks_like_a_scenario, read, write};
 use understudy_testing::press_cell;
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId, Via};
 
 fn members() -> Members {
     Members::new([
@@ -262,4 +262,45 @@ fn what_sets_inputs_is_read_as_it_is_written() {
     let wrong = read("scenario.toml", &wrong, Some(&members));
     let codes = wrong.report.diagnostics.iter().map(|found| found.code);
     assert_eq!(codes.collect::<Vec<_>>(), ["U0309"]);
+}
+
+/// The direct link of a remote I/O is pulled and plugged in, as it is written; a member without one has none to pull.
+#[test]
+fn a_direct_link_is_pulled_where_there_is_one() {
+    let cluster = "[cluster]\nname = \"linked\"\n[[controller]]\nname = \"pump\"\nladder = \"pump.ladder\"\n\
+        [[remote_io]]\nname = \"io\"\ncontroller = \"pump\"\n\
+        twin = { name = \"io-2\", wiring = \"exclusive\", direct_link = true }\n";
+    let ladder = "program pump\ninput full\noutput run\nrung \"run\"\n  /full ( run )\n";
+    let mut open = |_: &str| Ok(ladder.to_owned());
+    let cluster = understudy_cluster::read("cluster.toml", cluster, &mut open).cluster;
+    let members = Members::of(&cluster.expect("right"));
+    let step = |at: u32, action: &str, station: &str, more: &str| {
+        format!("[[step]]\nat = {at}\naction = \"{action}\"\nstation = \"{station}\"\n{more}\n")
+    };
+    let found = |steps: &str| {
+        read("s.toml", &format!("title = \"t\"\ncycles = 50\n{steps}"), Some(&members))
+    };
+    let steps = step(1, "unplug", "io-2", "direct_link = true")
+        + &step(9, "plug", "io", "direct_link = true\nothers = true");
+    let scenario = found(&steps).scenario.expect("right");
+    let done: Vec<(Member, Action)> =
+        scenario.steps.iter().map(|step| (step.member, step.action)).collect();
+    let (io, twin) = (Member::RemoteIo(ProgramId(0)), Member::Twin(ProgramId(0)));
+    let (pulled, plugged) =
+        (Action::Unplug { network: Via::Link }, Action::Plug { network: Via::Link });
+    assert_eq!(done, [(twin, pulled), (io, plugged), (twin, plugged)]);
+    let again = read("s.toml", &write(&scenario, &members, &[]), Some(&members));
+    assert_eq!(again.scenario.expect("right").steps, scenario.steps);
+
+    for (station, more, code) in [
+        ("pump", "direct_link = true", "U0309"),
+        ("io", "", "U0303"),
+        ("io", "network = 1", "U0309"),
+        ("io", "network = 3", "U0305"),
+        ("io", "network = 1\ndirect_link = true", "U0302"),
+    ] {
+        let report = found(&step(1, "unplug", station, more)).report;
+        let codes: Vec<&str> = report.diagnostics.iter().map(|it| it.code).collect();
+        assert_eq!(codes, [code], "{station} {more}");
+    }
 }

@@ -72,7 +72,40 @@ fn twins_that_cannot_work_are_refused_in_words_of_the_cluster_file() {
 
     // Which one is the author is decided by what they receive: neither is configured as it.
     check(pump("", &exclusive("author = true"), ""), "U0202", &["author"]);
-    check(pump("", &exclusive("direct = \"10.0.2.22:7450\""), ""), "U0202", &["direct"]);
+
+    // A direct link joins the two, and is no part of a network.
+    let linked = |networks: &str, first: &str, twin: &str| {
+        let cell = pump(networks, &exclusive(twin), modbus);
+        cell.replacen("controller = \"left\"", &format!("controller = \"left\"\n{first}"), 1)
+    };
+    let at = "address = \"10.0.1.22:7450\"\n";
+    let first = "link_address = \"10.0.9.21:7450\"";
+    let twin = format!("{at}link_address = \"10.0.9.22:7450\"\ndirect_link = true");
+    let (status, _, messages, _) = found(&linked("", first, &twin));
+    assert_eq!(status, 0, "{messages}");
+    let (status, _, messages, _) = found(&pump("", &exclusive("direct_link = true"), ""));
+    assert_eq!(status, 2, "one of the two has an address: {messages}");
+    let undeclared = format!("{at}link_address = \"10.0.9.22:7450\"");
+    let words = ["without `direct_link = true`", "to both remote I/Os"];
+    check(linked("", first, &undeclared), "U0263", &words);
+    let one_side = ["10.0.1.21:7450 has a direct link and no `link_address`"];
+    check(linked("", "", &twin), "U0263", &one_side);
+    let other_side = ["10.0.1.22:7450 has a direct link and no `link_address`"];
+    check(linked("", first, &format!("{at}direct_link = true")), "U0263", &other_side);
+    let alone = "name = \"right-io\"\nlink_address = \"10.0.9.23:7450\"";
+    let without_twin = linked("", first, &twin).replace("name = \"right-io\"", alone);
+    check(without_twin, "U0263", &["`link_address` of a remote I/O without a twin"]);
+    let on_network = linked("", "link_address = \"10.0.1.21:7460\"", &twin);
+    let words = ["10.0.1.21 is on network 1 and on the direct link", "an interface of its own"];
+    check(on_network, "U0263", &words);
+    let of_another = linked("", "link_address = \"10.0.1.22:7460\"", &twin);
+    check(of_another, "U0263", &["10.0.1.22 is on network 1 and on the direct link"]);
+    let same = linked("", "link_address = \"10.0.1.22:7450\"", &twin);
+    check(same, "U0210", &["10.0.1.22:7450"]);
+    let on_second = format!("{twin}\nsecond_address = \"10.0.9.22:7452\"");
+    let words = ["10.0.9.22 is on network 2 and on the direct link"];
+    check(linked("networks = 2\n", first, &on_second), "U0263", &words);
+    check(linked("", "direct_link = true", &twin), "U0202", &["direct_link"]);
 
     // A twin has the program of its remote I/O, and serves no other one.
     check(pump("", &exclusive("controller = \"right\""), ""), "U0202", &["controller"]);

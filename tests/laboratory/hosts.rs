@@ -15,7 +15,7 @@ use super::{
 };
 
 /// Whether this machine lets the tests make namespaces; where not, says why.
-fn permitted(name: &str) -> bool {
+pub(crate) fn permitted(name: &str) -> bool {
     let out = empty_folder(&format!("{name}_permitted"));
     let arguments = [
         "lab", PRESS_CELL, "--link", "udp", "--period", PERIOD, "--cycles", "1", "--hosts",

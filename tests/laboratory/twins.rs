@@ -10,6 +10,7 @@ use serde_json::Value;
 use understudy_testing::skip;
 
 use super::deaths::{Records, is, operate};
+use super::hosts::permitted;
 use super::shared::deployed::Running;
 use super::shared::{DEADLINE, empty_folder, modbus, some_at_a_time};
 use super::{assert_met, check_of, no_orphan, running_cluster, signal};
@@ -56,6 +57,61 @@ fn either_of_two_remote_ios_at_one_device_fails() {
 #[test]
 fn either_of_two_remote_ios_with_modules_of_their_own_fails() {
     either_fails("twins_parallel", "examples/twin-remote-io/parallel.toml");
+}
+
+/// Both networks are cut between the two remote I/Os of the robot, the direct link of the press is pulled, and the author of the robot ends.
+const SEPARATED: &str = "title = \"The networks fail between the remote I/Os of the robot\"\ncycles = 500\n\
+    [[step]]\nat = 40\naction = \"cut\"\nstation = \"robot-io\"\nto = \"robot-io-2\"\nboth_ways = true\n\
+    [[step]]\nat = 40\naction = \"unplug\"\nstation = \"press-io\"\ndirect_link = true\n\
+    [[step]]\nat = 240\naction = \"plug\"\nstation = \"press-io\"\ndirect_link = true\n\
+    [[step]]\nat = 250\naction = \"crash\"\nstation = \"robot-io\"\n\
+    [expect]\nwrong = 0\nplant_faults = 0\n";
+
+/// Over the direct link the two receive each other meanwhile, each path that fails is told of, and the follower takes over.
+fn separated_by_networks(name: &str, link: &str, more: &[&str]) {
+    let scenario = empty_folder(&format!("{name}_scenario")).join("separated.toml");
+    fs::write(&scenario, SEPARATED).expect("written");
+    let scenario = scenario.to_str().expect("text");
+    let cluster = ("examples/twin-remote-io/direct-link.toml", link);
+    let summary = check_of(name, cluster, scenario, more);
+    assert_met(&summary);
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME")).join(name);
+    assert_eq!(authors(&out.join("latest")).last().map(String::as_str), Some("robot-io-2"));
+    let faults = summary["network_faults"].as_array().expect("a list");
+    let names: Vec<&str> = faults.iter().filter_map(|fault| fault["name"].as_str()).collect();
+    for path in ["network 1", "network 2", "direct link"] {
+        assert!(names.contains(&path), "{path}: {summary:#}");
+    }
+    let journal = fs::read_to_string(out.join("latest/journal.jsonl")).expect("a journal");
+    let records = journal.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    let mut is_lost = false;
+    for record in records {
+        let is_of_robot = record["name"].as_str().is_some_and(|name| name.starts_with("robot"));
+        match record["event"]["event"].as_str() {
+            Some("fault") if record["event"]["action"] == "crash" => break,
+            Some("partner-lost") if is_of_robot => is_lost = true,
+            Some("partner-received") if is_of_robot => is_lost = false,
+            _ => {}
+        }
+    }
+    assert!(!is_lost, "the two remote I/Os of the robot receive each other over the direct link");
+}
+
+#[test]
+fn a_direct_link_carries_what_networks_do_not_over_udp() {
+    separated_by_networks("separated_udp", "udp", &[]);
+}
+
+#[test]
+fn a_direct_link_carries_what_networks_do_not_over_zenoh() {
+    separated_by_networks("separated_zenoh", "zenoh", &[]);
+}
+
+#[test]
+fn a_direct_link_is_a_cable_of_its_own_between_hosts() {
+    if permitted("separated_hosts") {
+        separated_by_networks("separated_netns", "udp", &["--hosts", "netns"]);
+    }
 }
 
 /// A sensor that two modules read, and what is written to the coil of each.

@@ -196,9 +196,9 @@ impl<'a> Members<'a> {
             return Err("U0621: the member belongs to a laboratory".to_owned());
         };
         let name = self.name(member);
-        let Addresses { first, second } = self.cluster.addresses(member);
+        let Addresses { first, second, .. } = self.cluster.addresses(member);
         let address = first.ok_or_else(|| format!("U0608: no address for {name}"))?;
-        let peer = Peer { member, name, address, second };
+        let peer = Peer { member, name, address, second, link: None };
         let hash = self.cluster.agreement().cluster;
         let call = Call::to(peer.call_address(), hash, &peer.name, keys);
         let said = call.and_then(|call| call.ask(request)).map_err(|error| error.to_string())?;

@@ -1,9 +1,10 @@
 //! `understudy-bench twins`: a cell of two networks, an understudy and twins on Modbus devices that record each write. Processes are killed and
 //! suspended, and networks cut, at random phases of the cycle, one or two at once. With `--hosts netns` each machine has a namespace and each network a
-//! bridge, and cables are pulled; the plants are simulated then, since a namespace does not reach the devices of this process.
+//! bridge, and cables are pulled, also that of a direct link; the plants are simulated then, since a namespace does not reach the devices of this process.
 
 mod device;
 mod judge;
+mod row;
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,16 +13,16 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use serde::Serialize;
 use understudy::{Answer, ClusterRun, Console, RunArguments, Status};
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Members, RunEvent, records_of};
 use understudy_remote_io::{Event, SWITCHOVER};
 use understudy_scenarios::{Action, Fault, Scenario};
-use understudy_wire::{Image, Member, ProgramId, SignalPlace, StationId, Via};
+use understudy_wire::{Image, Member, ProgramId, SignalPlace, Source, StationId, Via};
 
 use device::{Device, Recorded, TIMEOUT};
 use judge::{Found, Outputs, Rule, Write, judge, longest_gap};
+use row::{Row, answer};
 
 /// Kill and suspend members of a cell with twins and cut its networks, in front of devices that record who writes them
 #[derive(Debug, Args)]
@@ -35,6 +36,9 @@ pub(crate) struct Arguments {
     /// How the two remote I/Os of a program are connected to the plant
     #[arg(long, value_enum, default_value = "exclusive")]
     wiring: Wiring,
+    /// Join the two remote I/Os of each program by a direct link, which fails as a network does
+    #[arg(long)]
+    direct_link: bool,
     /// Folder for the files of the cell
     #[arg(long, value_name = "DIR", default_value = "twins-bench")]
     folder: PathBuf,
@@ -64,6 +68,9 @@ const UNRECORDED: u32 = 20;
 
 /// Cycles from the end of one fault to the next: enough for a new connection to the device and a synchronised station.
 const RECOVERY_CYCLES: f64 = 80.0;
+
+/// Periods from a question of a remote I/O to the answer of the operator: before the next fault.
+const ANSWER_CYCLES: u32 = 30;
 
 /// Cycles from a kill to the restart, and of a cut.
 const DOWN_CYCLES: f64 = 20.0;
@@ -113,9 +120,11 @@ fn fault(cluster: &Cluster, of: Target, begin: f64, random: &mut Pcg64Mcg) -> (V
         action,
     };
     if of == Target::Networks {
-        let network = if random.random() { Via::First } else { Via::Second };
+        let paths = if cluster.direct_links().is_empty() { 2 } else { 3 };
+        let network = Via::ALL[random.random_range(0..paths)];
         let end = begin + DOWN_CYCLES;
-        let all = cluster.members().flat_map(|member| {
+        let on = cluster.members().filter(|it| cluster.paths(*it).any(|via| via == network));
+        let all = on.flat_map(|member| {
             let cut = step(begin, member, Action::Unplug { network });
             [cut, step(end, member, Action::Plug { network })]
         });
@@ -185,7 +194,7 @@ type Devices = [[Device; 2]; 2];
 
 /// The cluster file, with the devices of its programs, or with simulated plants.
 fn files(arguments: &Arguments, devices: Option<&Devices>) -> std::io::Result<PathBuf> {
-    let Arguments { folder, take_over_after, wiring, .. } = arguments;
+    let Arguments { folder, take_over_after, wiring, direct_link, .. } = arguments;
     let mut text = "[cluster]\nname = \"twins\"\nperiod = \"10ms\"\nnetworks = 2\n".to_owned();
     for name in ["left", "right"] {
         let _ = writeln!(text, "[[controller]]\nname = \"{name}\"\nladder = \"robot.ladder\"");
@@ -205,7 +214,7 @@ fn files(arguments: &Arguments, devices: Option<&Devices>) -> std::io::Result<Pa
         let _ = writeln!(
             text,
             "[[remote_io]]\nname = \"{name}-io\"\ncontroller = \"{name}\"\n\
-             twin = {{ name = \"{name}-io-2\", wiring = \"{kind}\"{modbus}, take_over_after = {take_over_after} }}"
+             twin = {{ name = \"{name}-io-2\", wiring = \"{kind}\"{modbus}, take_over_after = {take_over_after}, direct_link = {direct_link} }}"
         );
         let Some([device, _]) = pair else {
             let watchdog = take_over_after + SWITCHOVER + 1;
@@ -230,42 +239,6 @@ fn files(arguments: &Arguments, devices: Option<&Devices>) -> std::io::Result<Pa
     Ok(file)
 }
 
-/// Result of the faults of one kind.
-#[derive(Debug, Serialize)]
-struct Row {
-    fault: &'static str,
-    count: u32,
-    directory: String,
-    /// Wrong outputs, and what else must not happen.
-    wrong: u64,
-    /// What it was.
-    violations: Vec<String>,
-    /// Deadlines with the last true output.
-    held: u64,
-    /// Deadlines with the fail-safe output.
-    fail_safe: u64,
-    /// Held and fail-safe deadlines during host stalls.
-    by_stall: u64,
-    /// Writes that the devices received.
-    writes: u64,
-    /// Connections that have written.
-    writers: u64,
-    /// Writes to a device by a connection after a later one had written.
-    by_two: u64,
-    /// Writes of outputs that no author has driven lately.
-    unproved: u64,
-    /// The same around the end of a process, whose last records are lost.
-    unrecorded: u64,
-    /// Reports that the input modules of a program differ, which they do not.
-    input_alarms: u64,
-    /// Questions to the operator, who does not answer here: the program is not executed from then on.
-    questions: u64,
-    /// Longest time without a write to the devices of a program, in periods.
-    longest_gap_cycles: f64,
-    /// Longest time that a device took to answer, in periods: a remote I/O gives up one that does not answer within its `timeout`.
-    slowest_answer_cycles: f64,
-}
-
 /// What the members of a run have recorded of the outputs of one program.
 #[derive(Debug, Default)]
 struct OfProgram {
@@ -273,6 +246,13 @@ struct OfProgram {
     driven: Vec<Outputs>,
     input_alarms: u64,
     questions: u64,
+    /// Whether a question was the last that was heard of the program.
+    is_asking: bool,
+}
+
+/// Whether outputs of the program were applied, and not those of a remote I/O without it.
+fn is_proved(event: &Event) -> bool {
+    matches!(event, Event::Applied { source: Source::Direct | Source::Reconstructed, .. })
 }
 
 /// What the members of a run have recorded: of each program, and when processes have ended.
@@ -303,12 +283,14 @@ fn recorded(directory: &Path, cluster: &Cluster) -> Result<(Vec<OfProgram>, Vec<
                 if let Some(image) = event.driven() {
                     let coils = coils(program, image);
                     of_program.driven.push(Outputs { at_ns: record.at_ns, coils });
+                    of_program.is_asking &= !is_proved(event);
                 }
                 let is_alarm =
                     matches!(event, Event::InputsDiffer { .. } | Event::InputExcluded { .. });
                 of_program.input_alarms += u64::from(is_alarm);
                 let is_question = matches!(event, Event::StateLost { asks: true, .. });
                 of_program.questions += u64::from(is_question);
+                of_program.is_asking |= is_question;
             }
             _ => {}
         }
@@ -382,13 +364,16 @@ fn row(
     console: &mut Console,
 ) -> Result<Row, Answer> {
     let cell = ClusterRun::of_file(file.to_owned(), &arguments.run)?;
-    let scenario = scenario(&cell.cluster, of, count, random).shortened(arguments.run.cycles);
+    let period = cell.cluster.agreement().schedule.period();
+    let answer_after = arguments.run.answer_after.or(Some(period * ANSWER_CYCLES));
+    let run = RunArguments { answer_after, ..arguments.run.clone() };
+    let scenario = scenario(&cell.cluster, of, count, random).shortened(run.cycles);
     console.note(&scenario.title);
     let failed = |error: std::io::Error| Answer::failed(Status::Failed, "U0602", error);
     for device in devices.into_iter().flatten().flatten() {
         device.take().map_err(failed)?;
     }
-    let (summary, judged) = cell.judged(&scenario, &arguments.run, console)?;
+    let (summary, judged) = cell.judged(&scenario, &run, console)?;
     if let Some(failure) = judged.failure {
         return Err(Answer::failed(Status::Failed, failure.code(), &failure));
     }
@@ -398,7 +383,6 @@ fn row(
     }
     keep_writes(cell.path(), &taken).map_err(failed)?;
     let sum = |of: fn(&Recorded) -> u64| taken.as_flattened().iter().map(of).sum();
-    let period = cell.cluster.agreement().schedule.period();
     let ns = |periods: u32| u64::try_from((period * periods).as_nanos()).unwrap_or(u64::MAX);
     let rule = Rule {
         oldest: ns(arguments.take_over_after + SWITCHOVER + 1 + UNDER_WAY),
@@ -435,58 +419,8 @@ fn row(
         unrecorded: found.iter().map(|it| it.unrecorded).sum(),
         input_alarms: programs.iter().map(|it| it.input_alarms).sum(),
         questions: programs.iter().map(|it| it.questions).sum(),
+        unanswered: programs.iter().map(|it| u64::from(it.is_asking)).sum(),
         longest_gap_cycles: longest as f64 / period.as_nanos() as f64,
         slowest_answer_cycles: slowest as f64 / period.as_nanos() as f64,
     })
-}
-
-fn answer(rows: &[Row]) -> Answer {
-    let mut text = format!(
-        "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>12} {:>15}\n",
-        "fault",
-        "count",
-        "wrong",
-        "held",
-        "fail-safe",
-        "by stall",
-        "writes",
-        "writers",
-        "two writers",
-        "unproved",
-        "unrecorded",
-        "input alarms",
-        "questions",
-        "longest gap",
-        "slowest answer"
-    );
-    for row in rows {
-        let _ = writeln!(
-            text,
-            "{:15} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>9} {:>11} {:>12} {:>9} {:>12.1} {:>15.1}",
-            row.fault,
-            row.count,
-            row.wrong,
-            row.held,
-            row.fail_safe,
-            row.by_stall,
-            row.writes,
-            row.writers,
-            row.by_two,
-            row.unproved,
-            row.unrecorded,
-            row.input_alarms,
-            row.questions,
-            row.longest_gap_cycles,
-            row.slowest_answer_cycles
-        );
-        for violation in &row.violations {
-            let _ = writeln!(text, "    {violation}");
-        }
-    }
-    text.push_str("held and fail-safe are deadlines of all remote I/Os; unproved are writes of outputs that no author has driven lately, unrecorded those around a kill;\na program of which a question is asked is not executed until the end of its row;\nthe longest gap is that between two writes to the devices of a program, in periods; the slowest answer is that of a device, which a remote I/O gives up after 100 ms\n");
-    let is_right =
-        |row: &Row| (row.wrong, row.by_two, row.unproved, row.input_alarms) == (0, 0, 0, 0);
-    let passed = rows.iter().all(is_right);
-    let status = if passed { Status::Done } else { Status::Failed };
-    Answer::done(text, rows).with_status(status)
 }

@@ -6,7 +6,8 @@
 //!                        └ 10.87.0.1
 //! ```
 //!
-//! With two networks each host has an `eth1` at 10.88.0.0/16 too, on a bridge of its own.
+//! With two networks each host has an `eth1` at 10.88.0.0/16 too, on a bridge of its own. Hosts with a direct link have an `eth2` at 10.89.0.0/16, on a
+//! bridge of their own, which no cut and no loss between hosts concerns.
 //!
 //! Invariant: nothing is left behind, however the run ends. The namespaces have no names: this process holds them by file
 //! descriptors, the processes in them by being there, and when the last of those is gone the kernel removes the namespace with its
@@ -30,10 +31,10 @@ use crate::tools::{IP, NFT, run};
 
 /// Hosts of one network, at most.
 const MAXIMUM_HOSTS: usize = 250;
-/// The first two bytes of every address, by network.
-const NETWORKS: [[u8; 2]; 2] = [[10, 87], [10, 88]];
-/// The first letter of the switch's ports, by network.
-const PORTS: [char; 2] = ['h', 's'];
+/// The first two bytes of every address, by path.
+const NETWORKS: [[u8; 2]; Via::ALL.len()] = [[10, 87], [10, 88], [10, 89]];
+/// The first letter of the switch's ports, by path.
+const PORTS: [char; Via::ALL.len()] = ['h', 's', 'l'];
 /// A share is written as so many of this.
 const PARTS: u64 = 1_000_000;
 
@@ -51,7 +52,7 @@ impl Host {
         &self.name
     }
 
-    /// Its address on a network.
+    /// Its address on a path.
     pub fn address(&self, via: Via) -> Ipv4Addr {
         let [first, second] = NETWORKS[via.index()];
         Ipv4Addr::new(first, second, 0, self.place + 2)
@@ -64,13 +65,14 @@ pub struct Hosts {
     own: OwnedFd,
     switch: OwnedFd,
     hosts: Vec<Host>,
-    networks: &'static [Via],
+    /// Whether there is a second network.
+    has_two_networks: bool,
     nft: PathBuf,
     /// From where to where nothing passes.
     cuts: BTreeSet<(usize, usize)>,
     /// Of what passes from one host to another, by chance.
     losses: BTreeMap<(usize, usize), Share>,
-    /// Hosts whose cable to a network is pulled.
+    /// Hosts whose cable to a network is pulled, or whose direct link.
     unplugged: BTreeSet<(Via, usize)>,
 }
 
@@ -80,19 +82,23 @@ pub fn missing_tools() -> Vec<NetworkError> {
 }
 
 impl Hosts {
-    /// Where the switch itself has an address on a network, for a proxy between the hosts.
+    /// Where the switch itself has an address on a path, for a proxy between the hosts.
     pub fn switch(via: Via) -> Ipv4Addr {
         let [first, second] = NETWORKS[via.index()];
         Ipv4Addr::new(first, second, 0, 1)
     }
 
-    /// Makes one host for each name, on one network or on two.
+    /// Makes one host for each name, on one network or on two; those at the places in `linked` have direct links.
     ///
     /// To be called where the calling thread may change its network namespace: it is the one that it was again afterwards.
     ///
     /// # Errors
     /// [`NetworkError::NotPermitted`], [`NetworkError::NoTool`], or what a tool said. Nothing is left then.
-    pub fn build(names: &[String], has_two_networks: bool) -> Result<Self, NetworkError> {
+    pub fn build(
+        names: &[String],
+        has_two_networks: bool,
+        linked: &BTreeSet<usize>,
+    ) -> Result<Self, NetworkError> {
         let (ip, nft) = (IP.find()?, NFT.find()?);
         if names.len() > MAXIMUM_HOSTS {
             return Err(NetworkError::System {
@@ -113,18 +119,28 @@ impl Hosts {
             cuts: BTreeSet::new(),
             losses: BTreeMap::new(),
             unplugged: BTreeSet::new(),
-            networks: if has_two_networks { &Via::BOTH } else { &[Via::First] },
+            has_two_networks,
+        };
+        let is_on = |place: usize, via: Via| match via {
+            Via::First => true,
+            Via::Second => has_two_networks,
+            Via::Link => linked.contains(&place),
         };
         let process = std::process::id();
         let mut bridge = String::from("link set lo up\n");
-        for (number, via) in hosts.networks.iter().enumerate() {
-            let (switch, letter) = (Self::switch(*via), PORTS[number]);
+        for via in Via::ALL {
+            let number = via.index();
+            let (switch, letter) = (Self::switch(via), PORTS[number]);
+            let on: Vec<usize> = (0..names.len()).filter(|place| is_on(*place, via)).collect();
+            if on.is_empty() {
+                continue;
+            }
             let _ = write!(
                 bridge,
                 "link add br{number} type bridge\naddr add {switch}/16 dev br{number}\nlink set br{number} up\n"
             );
-            for (place, host) in hosts.hosts.iter().enumerate() {
-                let namespace = host.namespace.as_raw_fd();
+            for place in on {
+                let namespace = hosts.hosts[place].namespace.as_raw_fd();
                 let _ = write!(
                     bridge,
                     "link add {letter}{place} type veth peer name eth{number} netns /proc/{process}/fd/{namespace}\n\
@@ -135,8 +151,8 @@ impl Hosts {
         hosts.in_switch(|| run(&ip, &["-batch", "-"], &bridge))??;
         for (place, host) in hosts.hosts.iter().enumerate() {
             let mut lines = String::from("link set lo up\n");
-            for (number, via) in hosts.networks.iter().enumerate() {
-                let address = host.address(*via);
+            for via in Via::ALL.into_iter().filter(|via| is_on(place, *via)) {
+                let (number, address) = (via.index(), host.address(via));
                 let _ = write!(
                     lines,
                     "addr add {address}/16 dev eth{number}\nlink set eth{number} up\n"
@@ -172,7 +188,7 @@ impl Hosts {
         visit(&self.switch, &self.own, work)
     }
 
-    /// Lets nothing more through from one host to another, or everything again.
+    /// Lets nothing more through the networks from one host to another, or everything again.
     ///
     /// # Errors
     /// What `nft` said; everything passes as before then.
@@ -188,7 +204,7 @@ impl Hosts {
         self.apply_rules().inspect_err(|_| self.cuts = before)
     }
 
-    /// Pulls the cable between a host and one network, or plugs it in again.
+    /// Pulls the cable between a host and one network, or its direct link, or plugs it in again.
     ///
     /// # Errors
     /// What `nft` said; everything passes as before then.
@@ -206,7 +222,7 @@ impl Hosts {
         self.apply_rules().inspect_err(|_| self.unplugged = before)
     }
 
-    /// Loses a share of what passes from one host to another, by chance.
+    /// Loses a share of what passes through the networks from one host to another, by chance.
     ///
     /// # Errors
     /// What `nft` said; everything passes as before then.
@@ -221,7 +237,8 @@ impl Hosts {
 
     /// All rules at once: `nft` takes a file as a whole or not at all.
     fn apply_rules(&self) -> Result<(), NetworkError> {
-        let mut rules = rules(self.networks, &self.cuts, &self.losses);
+        let networks = if self.has_two_networks { &Via::NETWORKS[..] } else { &[Via::First] };
+        let mut rules = rules(networks, &self.cuts, &self.losses);
         for (via, host) in &self.unplugged {
             let port = PORTS[via.index()];
             for side in ["iifname", "oifname"] {

@@ -1,5 +1,6 @@
 //! Hosts of namespaces, where this machine lets the tests make them.
 
+use std::collections::BTreeSet;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
 
@@ -12,7 +13,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 
 fn hosts(count: usize) -> Option<Hosts> {
     let names: Vec<String> = (0..count).map(|number| format!("host-{number}")).collect();
-    match Hosts::build(&names, false) {
+    match Hosts::build(&names, false, &BTreeSet::new()) {
         Ok(hosts) => Some(hosts),
         Err(error @ (NetworkError::NotPermitted { .. } | NetworkError::NoTool { .. })) => {
             skip(error);

@@ -69,6 +69,9 @@ pub struct LaboratorySettings {
     pub journal_limit_bytes: u64,
     /// What follows when a member ends unexpectedly.
     pub deaths: Deaths,
+    /// How long after a question of a remote I/O an operator answers it: with the newest state that a station holds, and with a cold start where none
+    /// holds one. Nothing where it is not answered.
+    pub answers_after: Option<Duration>,
 }
 
 /// What the laboratory does when a member ends unexpectedly after it was ready.
@@ -152,7 +155,8 @@ pub fn run_commanded(
     afterwards: Option<Afterwards<'_>>,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
-    let mut steps = Steps::new(scenario, cluster.agreement().schedule.period());
+    let period = cluster.agreement().schedule.period();
+    let mut steps = Steps::new(scenario, period, settings.answers_after);
     let conductor = &mut steps;
     run(cluster, scenario, settings, directory, commands, afterwards, conductor, watch)
 }

@@ -24,7 +24,7 @@ impl Laboratory<'_> {
         let name = self.name(member);
         let multicast = self.site.multicast();
         let multicast = multicast.map_or("none".to_owned(), |first| first.to_string());
-        let zenoh = zenoh_runtime(self.site.has_two_networks());
+        let zenoh = zenoh_runtime(self.site.paths(member));
         let mut command = Command::new(&self.settings.program);
         command
             .arg(match member {
@@ -242,7 +242,7 @@ impl Laboratory<'_> {
         Ok(())
     }
 
-    /// A member sends and receives nothing more over one of two networks, or everything again. A plant stays on the cables of its remote I/O.
+    /// A member sends and receives nothing more over a network or the direct link, or everything again. A plant stays on the cables of its remote I/O.
     async fn unplug(
         &mut self,
         member: Member,

@@ -10,7 +10,7 @@
 //! that is suspended must not stop its plants. With the proxy each member is told of addresses at which it
 //! stands for the member's peers, one for each pair and direction, and knows nothing of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::path::{Path, PathBuf};
@@ -68,7 +68,8 @@ pub(super) struct Site {
     impairment: Impairment,
     /// Of two networks the one that is impaired; both where absent.
     impaired: Option<Via>,
-    has_two_networks: bool,
+    /// The number of paths that each member is on.
+    paths: BTreeMap<Member, usize>,
     /// The first multicast group of the frames.
     multicast: Option<SocketAddrV4>,
 }
@@ -96,27 +97,31 @@ impl Site {
             HostKind::Loopback => None,
             HostKind::Namespaces => {
                 let names = host_names(cluster, &host_of);
-                Some(Hosts::build(&names, cluster.has_two_networks())?)
+                let linked = host_of
+                    .iter()
+                    .filter(|(member, _)| cluster.paths(**member).any(|via| via == Via::Link));
+                let linked: BTreeSet<usize> = linked.map(|(_, host)| *host).collect();
+                Some(Hosts::build(&names, cluster.has_two_networks(), &linked)?)
             }
         };
         let addresses = match &hosts {
             None => loopback_addresses(cluster)
                 .map_err(system("free ports of the loopback interface"))?,
-            Some(hosts) => namespace_addresses(&members, &host_of, hosts),
+            Some(hosts) => namespace_addresses(cluster, &host_of, hosts),
         };
         let peers: Vec<Peer> = members
             .iter()
             .zip(addresses)
-            .filter_map(|(&member, [address, second])| {
+            .filter_map(|(&member, Addresses { first, second, link })| {
                 let name = cluster.member_name(member)?.to_owned();
-                let second = Some(second).filter(|_| cluster.has_two_networks());
-                Some(Peer { member, name, address, second })
+                Some(Peer { member, name, address: first?, second, link })
             })
             .collect();
         let list = directory.file("endpoints.json");
         write_list(&list, &peers).map_err(system("to write endpoints.json"))?;
         let mut site = Self {
             endpoints: members.iter().map(|&member| (member, list.clone())).collect(),
+            paths: members.iter().map(|&it| (it, cluster.paths(it).count())).collect(),
             members,
             hosts: None,
             host_of,
@@ -125,7 +130,6 @@ impl Site {
             stand_ins: Vec::new(),
             impairment,
             impaired,
-            has_two_networks: cluster.has_two_networks(),
             multicast: None,
         };
         let only_loss = impairment == Impairment { loss: impairment.loss, ..Impairment::default() };
@@ -170,7 +174,7 @@ impl Site {
         self.multicast
     }
 
-    /// Lets no frame of one member through to another any more, or each again. False where nothing between them can do that, so that the
+    /// Lets no frame of one member through the networks to another any more, or each again. False where nothing between them can do that, so that the
     /// receiver has to drop them.
     pub(super) fn cut(&mut self, from: Member, to: Member, cut: bool) -> io::Result<bool> {
         let places = (self.host_of.get(&from), self.host_of.get(&to));
@@ -183,12 +187,12 @@ impl Site {
         }
     }
 
-    /// Whether each frame is sent over two networks.
-    pub(super) fn has_two_networks(&self) -> bool {
-        self.has_two_networks
+    /// The number of paths that a member is on.
+    pub(super) fn paths(&self, member: Member) -> usize {
+        self.paths.get(&member).copied().unwrap_or(1)
     }
 
-    /// Pulls the cable between a member's host and a network, or plugs it in again. False where the member has to do it by itself.
+    /// Pulls the cable between a member's host and a network, or its direct link, or plugs it in again. False where the member has to do it by itself.
     pub(super) fn unplug(
         &mut self,
         member: Member,
@@ -236,7 +240,7 @@ impl Site {
         let mut routes: Vec<Route> = Vec::new();
         let mut networks: Vec<Via> = Vec::new();
         let impairment = |via| {
-            let is_impaired = self.impaired.is_none_or(|impaired| impaired == via);
+            let is_impaired = self.impaired.map_or(via != Via::Link, |impaired| impaired == via);
             if is_impaired { self.impairment } else { Impairment::default() }
         };
         for first in peers {
@@ -253,7 +257,10 @@ impl Site {
                 if !opens || !own.talks_with(second.member) {
                     continue;
                 }
-                for (via, address) in Via::BOTH.into_iter().zip(second.addresses()) {
+                for (via, address) in second.paths() {
+                    if via == Via::Link && first.member.partner() != Some(second.member) {
+                        continue;
+                    }
                     self.routes.insert((first.member, second.member, via), routes.len());
                     networks.push(via);
                     routes.push(Route {
@@ -306,6 +313,7 @@ impl Site {
                     Peer {
                         address: stands_for(Via::First).unwrap_or(peer.address),
                         second: stands_for(Via::Second).or(peer.second),
+                        link: stands_for(Via::Link).or(peer.link),
                         ..peer.clone()
                     }
                 })
@@ -362,39 +370,51 @@ fn host_names(cluster: &Cluster, host_of: &BTreeMap<Member, usize>) -> Vec<Strin
         .collect()
 }
 
-/// From the cluster file, or free ones of the loopback interface, for both networks.
-fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<[SocketAddr; 2]>> {
-    let known: Vec<Addresses> = cluster.members().map(|member| cluster.addresses(member)).collect();
-    let is_used = |via: Via| via == Via::First || cluster.has_two_networks();
-    let of = |addresses: &Addresses| [addresses.first, addresses.second];
-    let known = known.iter().map(of);
-    let lacking = known.clone().flat_map(|addresses| Via::BOTH.into_iter().zip(addresses));
-    let lacking = lacking.filter(|(via, address)| is_used(*via) && address.is_none()).count();
-    let mut free = understudy_bus::free_addresses(lacking)?.into_iter();
-    let both = known.filter_map(|[first, second]| {
-        let first = first.or_else(|| free.next())?;
-        let second = if is_used(Via::Second) { second.or_else(|| free.next())? } else { first };
-        Some([first, second])
-    });
-    Ok(both.collect())
+/// From the cluster file, or free ones of the loopback interface, for each path.
+fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<Addresses>> {
+    let paths = |member| cluster.paths(member).map(move |via| (member, via));
+    let lacking = cluster.members().flat_map(paths);
+    let lacking = lacking.filter(|(member, via)| cluster.addresses(*member).at(*via).is_none());
+    let mut free = understudy_bus::free_addresses(lacking.count())?.into_iter();
+    let mut of = |member| {
+        let known = cluster.addresses(member);
+        on_paths(cluster, member, |via| known.at(via).or_else(|| free.next()))
+    };
+    Ok(cluster.members().map(&mut of).collect())
 }
 
 fn namespace_addresses(
-    members: &[Member],
+    cluster: &Cluster,
     host_of: &BTreeMap<Member, usize>,
     hosts: &Hosts,
-) -> Vec<[SocketAddr; 2]> {
+) -> Vec<Addresses> {
     let mut used: BTreeMap<usize, u16> = BTreeMap::new();
-    members
-        .iter()
-        .filter_map(|member| {
-            let host = *host_of.get(member)?;
-            let port = used.entry(host).or_insert(FIRST_PORT);
-            *port += 1;
-            let host = hosts.hosts().get(host)?;
-            Some(Via::BOTH.map(|via| (host.address(via), *port - 1).into()))
-        })
-        .collect()
+    let mut of = |member| {
+        let host = *host_of.get(&member)?;
+        let port = used.entry(host).or_insert(FIRST_PORT);
+        *port += 1;
+        let host = hosts.hosts().get(host)?;
+        Some(on_paths(cluster, member, |via| Some((host.address(via), *port - 1).into())))
+    };
+    cluster.members().filter_map(&mut of).collect()
+}
+
+/// Addresses on the paths of a member alone.
+fn on_paths(
+    cluster: &Cluster,
+    member: Member,
+    mut address: impl FnMut(Via) -> Option<SocketAddr>,
+) -> Addresses {
+    let mut addresses = Addresses::default();
+    for via in cluster.paths(member) {
+        let place = match via {
+            Via::First => &mut addresses.first,
+            Via::Second => &mut addresses.second,
+            Via::Link => &mut addresses.link,
+        };
+        *place = address(via);
+    }
+    addresses
 }
 
 fn write_list(path: &Path, peers: &[Peer]) -> io::Result<()> {

@@ -6,18 +6,25 @@
 //!
 //! Invariant: no step is done before one of an earlier cycle. A laboratory that is late learns of several cycles at once, and phases would order their steps
 //! otherwise: a station that continues before it is stopped stays stopped.
+//!
+//! Besides the steps, an operator may answer the questions of remote I/Os, some time after each.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use understudy_journal::Record;
+use understudy_journal::{Happening, Record};
+use understudy_remote_io::Event;
 use understudy_scenarios::Scenario;
-use understudy_simulator::Fault;
+use understudy_simulator::{Action, Fault};
+use understudy_wire::{Member, StateChoice};
 
 use super::Conductor;
 
 /// Periods without a report after which the clock counts.
 const SILENT_PERIODS: u32 = 20;
+
+/// Multiple of the time to an answer after which a question that is still open is answered by a cold start: no station holds a state.
+const COLD_AFTER: u32 = 4;
 
 /// Share of the period between a deadline and the next cycle.
 const DEADLINE_TO_NEXT_CYCLE: f64 = 0.35;
@@ -33,10 +40,18 @@ pub(super) struct Steps {
     /// When the last step that was armed is done.
     done: Option<Instant>,
     newest: Option<(u64, Instant)>,
+    /// Time from a question of a remote I/O to its answer; nothing where none is given.
+    answers_after: Option<Duration>,
+    /// Answers that are due, in the order of their times.
+    answers: Vec<(Instant, Fault)>,
 }
 
 impl Steps {
-    pub(super) fn new(scenario: &Scenario, period: Duration) -> Self {
+    pub(super) fn new(
+        scenario: &Scenario,
+        period: Duration,
+        answers_after: Option<Duration>,
+    ) -> Self {
         Self {
             period,
             waiting: scenario.steps.iter().copied().collect(),
@@ -44,12 +59,34 @@ impl Steps {
             last: None,
             done: None,
             newest: None,
+            answers_after,
+            answers: Vec::new(),
         }
+    }
+
+    /// A remote I/O asks which state its program continues from. An answer that it does not need any more is refused.
+    fn asked(&mut self, member: Member, now: Instant) {
+        let Some(after) = self.answers_after else {
+            return;
+        };
+        let choices = [(1, StateChoice::Newest { cycle: None }), (COLD_AFTER, StateChoice::Cold)];
+        self.answers.retain(|(_, answer)| answer.member != member);
+        self.answers.extend(choices.map(|(times, choice)| {
+            let action = Action::Choose { choice };
+            (now + after * times, Fault { at_cycle: 0, phase: 0.0, member, action })
+        }));
+        self.answers.sort_by_key(|(due, _)| *due);
     }
 }
 
 impl Conductor for Steps {
-    fn hear(&mut self, _: &Record, _: Instant) {}
+    fn hear(&mut self, record: &Record, now: Instant) {
+        if let (Happening::RemoteIo(Event::StateLost { asks: true, .. }), Some(member)) =
+            (&record.event, record.member)
+        {
+            self.asked(member, now);
+        }
+    }
 
     fn follow(&mut self, cycle: Option<u64>, now: Instant) {
         let Some(cycle) = cycle else {
@@ -92,16 +129,22 @@ impl Conductor for Steps {
     }
 
     fn next_due(&self) -> Option<Instant> {
-        self.armed.first().map(|(due, _)| *due)
+        let first = |due: &[(Instant, Fault)]| due.first().map(|(due, _)| *due);
+        [first(&self.armed), first(&self.answers)].into_iter().flatten().min()
     }
 
     fn take_due(&mut self, now: Instant) -> Option<Fault> {
         let due = self.next_due()?;
-        (due <= now).then(|| self.armed.remove(0).1)
+        if due > now {
+            return None;
+        }
+        let is_answer = self.answers.first().is_some_and(|(answer, _)| *answer == due);
+        let list = if is_answer { &mut self.answers } else { &mut self.armed };
+        Some(list.remove(0).1)
     }
 
     fn wait_for_time(&self) -> bool {
-        !self.waiting.is_empty() || !self.armed.is_empty()
+        !(self.waiting.is_empty() && self.armed.is_empty() && self.answers.is_empty())
     }
 
     fn is_over(&self, _: Instant) -> bool {
@@ -111,8 +154,8 @@ impl Conductor for Steps {
 
 #[cfg(test)]
 mod tests {
-    use understudy_simulator::Action;
-    use understudy_wire::{Member, StationId};
+    use understudy_remote_io::AskReason;
+    use understudy_wire::{Moment, ProgramId, StationId};
 
     use super::*;
 
@@ -133,7 +176,46 @@ mod tests {
                 .collect(),
             ..Scenario::default()
         };
-        Steps::new(&scenario, PERIOD)
+        Steps::new(&scenario, PERIOD, None)
+    }
+
+    /// The remote I/O that asks is answered; a question that is asked again puts the cold start off, and one that is not asked gets no answer.
+    #[test]
+    fn questions_are_answered_once_each() {
+        let (now, after) = (Instant::now(), PERIOD * 10);
+        let twin = Member::Twin(ProgramId(0));
+        let asked = |asks| Record {
+            at_ns: 0,
+            name: "twin".to_owned(),
+            member: Some(twin),
+            event: Happening::RemoteIo(Event::StateLost {
+                moment: Moment::default(),
+                applied: None,
+                newest: None,
+                holder: None,
+                asks,
+                reason: AskReason::Doubt,
+                inputs: None,
+            }),
+        };
+        let mut unanswered = steps(&[]);
+        unanswered.hear(&asked(true), now);
+        assert_eq!(unanswered.next_due(), None);
+        let mut steps = Steps { answers_after: Some(after), ..steps(&[]) };
+        steps.hear(&asked(false), now);
+        assert_eq!(steps.next_due(), None);
+        steps.hear(&asked(true), now);
+        assert_eq!(steps.take_due(now + PERIOD), None);
+        let choice =
+            |steps: &mut Steps, at: Instant| steps.take_due(at).map(|it| (it.member, it.action));
+        let newest = Action::Choose { choice: StateChoice::Newest { cycle: None } };
+        assert_eq!(choice(&mut steps, now + after), Some((twin, newest)));
+        steps.hear(&asked(true), now + after);
+        assert_eq!(choice(&mut steps, now + after * 2), Some((twin, newest)));
+        assert_eq!(steps.take_due(now + after * 4), None);
+        let cold = Action::Choose { choice: StateChoice::Cold };
+        assert_eq!(choice(&mut steps, now + after * 5), Some((twin, cold)));
+        assert!(!steps.wait_for_time());
     }
 
     #[test]

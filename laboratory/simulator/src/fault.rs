@@ -122,8 +122,8 @@ pub enum Action {
         /// Who hears it again.
         to: Member,
     },
-    /// The cable between it and one of two networks is pulled: over that one it sends and receives nothing more. Where all are unplugged from a
-    /// network, that network has failed.
+    /// The cable between it and one of two networks, or the direct link to the other remote I/O of its program, is pulled: over that one it sends and
+    /// receives nothing more. Where all are unplugged from a network, that network has failed.
     Unplug {
         /// Which.
         network: Via,

@@ -45,8 +45,10 @@ pub(crate) struct Links {
     anybody_late: bool,
     /// Over how many networks each frame is sent.
     networks: &'static [Via],
-    /// By place: the networks that a member is unplugged from.
-    unplugged: Vec<[bool; 2]>,
+    /// Programs whose two remote I/Os a direct link joins.
+    linked: ProgramSet,
+    /// By place: the paths that a member is unplugged from.
+    unplugged: Vec<[bool; Via::ALL.len()]>,
     remembers: bool,
     refused: u64,
     metered: Option<Metered>,
@@ -94,10 +96,10 @@ impl Flips {
 }
 
 impl Links {
-    /// Links of stations and remote I/Os, by their numbers, over two networks where they have them.
+    /// Links of stations and remote I/Os, by their numbers, over two networks and over the direct links of these programs where they have them.
     pub(crate) fn new(
         (stations, remote_ios): (usize, usize),
-        (roster, has_two_networks): (Roster, bool),
+        (roster, has_two_networks, linked): (Roster, bool, ProgramSet),
         network: Network,
         seed: u64,
     ) -> Self {
@@ -114,8 +116,9 @@ impl Links {
             intakes: vec![Flips::default(); stations],
             late: vec![Duration::ZERO; stations + 2 * remote_ios],
             anybody_late: false,
-            networks: if has_two_networks { &Via::BOTH } else { &[Via::First] },
-            unplugged: vec![[false; 2]; stations + 2 * remote_ios],
+            networks: if has_two_networks { &Via::NETWORKS } else { &[Via::First] },
+            linked,
+            unplugged: vec![[false; Via::ALL.len()]; stations + 2 * remote_ios],
             remembers: false,
             refused: 0,
             metered: None,
@@ -132,19 +135,31 @@ impl Links {
         let (Some(sender), Some(receiver)) = (self.place(from), self.place(to)) else {
             return false;
         };
-        let deaf = self.senders[sender].deaf.contains(to);
         let delays = &self.senders[sender].delays;
         let late = delays.iter().any(|(place, _)| *place == receiver);
         let slow = |place: usize| !self.late[place].is_zero();
-        let is_joined = self.joins(sender, receiver).next().is_some();
-        is_joined && !deaf && !late && !slow(sender) && !slow(receiver)
+        let is_joined =
+            self.joins((from, sender), (to, receiver)).any(|via| via == Via::Link || !late);
+        is_joined && !slow(sender) && !slow(receiver)
     }
 
-    /// The networks that carry frames from one place to another.
-    fn joins(&self, sender: usize, receiver: usize) -> impl Iterator<Item = Via> + use<> {
+    /// The paths that carry frames from one member to another one, each with its place.
+    fn joins(
+        &self,
+        (from, sender): (Member, usize),
+        (to, receiver): (Member, usize),
+    ) -> impl Iterator<Item = Via> + use<> {
+        let is_deaf = self.senders[sender].deaf.contains(to);
+        let networks = self.networks.iter().copied().filter(move |_| !is_deaf);
+        let link = self.is_linked(from, to).then_some(Via::Link);
         let (sender, receiver) = (self.unplugged[sender], self.unplugged[receiver]);
-        let networks = self.networks.iter().copied();
-        networks.filter(move |via| !sender[via.index()] && !receiver[via.index()])
+        networks.chain(link).filter(move |via| !sender[via.index()] && !receiver[via.index()])
+    }
+
+    /// Whether a direct link joins two members.
+    fn is_linked(&self, from: Member, to: Member) -> bool {
+        let is_linked = from.sampled_program().is_some_and(|program| self.linked.contains(program));
+        is_linked && from.partner() == Some(to)
     }
 
     /// Counts what is sent, from here on.
@@ -324,6 +339,13 @@ impl Links {
         let topic = self.roster.topic(&frame);
         let audience = self.roster.audience(topic, frame.header.sender);
         let mut to = audience.without(sender.deaf);
+        let linked = frame.header.sender.partner().filter(|partner| {
+            audience.contains(*partner) && self.is_linked(frame.header.sender, *partner)
+        });
+        if let Some(partner) = linked {
+            // The direct link is no part of the networks.
+            to = to.or(Audience::only(partner));
+        }
         // Plants are not on the network.
         to.plants = ProgramSet::EMPTY;
         if let Body::Transfer(transfer) = &frame.body {
@@ -338,8 +360,10 @@ impl Links {
             metered.frames += receivers;
             metered.bytes += receivers * bytes.len() as u64;
         }
-        let all_plugged = self.unplugged.iter().all(|unplugged| *unplugged == [false; 2]);
-        let is_even = self.network.is_even() && self.network.over.is_none();
+        let all_plugged = self.unplugged.iter().all(|unplugged| !unplugged.contains(&true));
+        // A late network brings a frame later than a direct link.
+        let is_as_fast = linked.is_none() || self.network.latency == Network::default().latency;
+        let is_even = self.network.is_even() && self.network.over.is_none() && is_as_fast;
         if is_even && !self.anybody_late && sender.delays.is_empty() && all_plugged {
             let at = now + self.network.latency;
             self.queue.push(at, frame, to);
@@ -347,7 +371,7 @@ impl Links {
         }
         for member in to.members() {
             if let Some(receiver) = self.place(member) {
-                self.carry_to(now, (place, receiver), &frame, Audience::only(member));
+                self.carry_to(now, (place, receiver), &frame, member);
             }
         }
     }
@@ -357,14 +381,17 @@ impl Links {
         now: Time,
         (sender, receiver): (usize, usize),
         frame: &Arc<Frame>,
-        to: Audience,
+        to: Member,
     ) {
+        let from = frame.header.sender;
         let delays = self.senders[sender].delays.iter();
         let late = delays.filter(|(to, _)| *to == receiver).map(|(_, by)| *by);
-        let late = self.late[receiver] + late.sum::<Duration>();
+        let late_network = late.sum::<Duration>();
         let mut copies = SmallVec::<[(Time, Arc<Frame>); 4]>::new();
-        for via in self.joins(sender, receiver) {
+        for via in self.joins((from, sender), (to, receiver)) {
             let network = self.network.at(via);
+            let late_network = if via == Via::Link { Duration::ZERO } else { late_network };
+            let late = self.late[receiver] + late_network;
             for delay in network.arrivals(&mut self.random) {
                 let share = network.corruption;
                 let frame = if share > 0.0 && self.random.random::<f64>() < share {
@@ -375,13 +402,13 @@ impl Links {
                 copies.extend(frame.map(|frame| (now + delay + late, frame)));
             }
         }
-        if self.networks.len() > 1 {
+        if self.networks.len() > 1 || self.is_linked(from, to) {
             // The receiver takes the first copy.
             copies.sort_by_key(|(at, _)| *at);
             copies.truncate(1);
         }
         for (at, frame) in copies {
-            self.queue.push(at, frame, to);
+            self.queue.push(at, frame, Audience::only(to));
         }
     }
 }
@@ -403,6 +430,7 @@ impl Hash for Links {
             late,
             anybody_late: _,
             networks: _,
+            linked: _,
             unplugged,
             remembers: _,
             refused: _,

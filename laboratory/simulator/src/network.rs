@@ -22,7 +22,7 @@ pub struct Network {
     /// Share of arriving frames of which a bit has flipped on their way, from 0 to 1, for each receiver.
     #[serde(default)]
     pub corruption: f64,
-    /// Of two networks the one that is so, while the other one is quiet; both where absent.
+    /// The path that is so, while the others are quiet; all networks where absent, and the direct links are quiet then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub over: Option<Via>,
 }
@@ -62,9 +62,10 @@ impl Default for Network {
 }
 
 impl Network {
-    /// What one of two networks is.
+    /// What one of several paths is.
     pub(crate) fn at(self, via: Via) -> Self {
-        if self.over.is_none_or(|over| over == via) { self } else { Self::default() }
+        let is_so = self.over.map_or(via != Via::Link, |over| over == via);
+        if is_so { self } else { Self::default() }
     }
 
     /// Whether all receivers hear a frame at the same time, and surely.

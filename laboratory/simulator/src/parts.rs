@@ -5,7 +5,7 @@ use std::sync::Arc;
 use understudy_cluster::Cluster;
 use understudy_cycle::OnlineChange;
 use understudy_plant::{Followed, Plant};
-use understudy_wire::{Configurations, Member, Moment, ProgramId, Roster, StationId};
+use understudy_wire::{Configurations, Member, Moment, ProgramId, ProgramSet, Roster, StationId};
 
 /// The settings of every member. Remote I/Os and plants are indexed by program.
 #[derive(Debug, Clone)]
@@ -22,6 +22,8 @@ pub struct Parts {
     pub follows: Vec<Vec<Followed>>,
     /// Whether each frame is sent over two networks.
     pub has_two_networks: bool,
+    /// Programs whose two remote I/Os a direct link joins.
+    pub direct_links: ProgramSet,
     /// The online change that an engineer may make in a run.
     pub change: Option<Arc<OnlineChange>>,
 }
@@ -75,6 +77,7 @@ pub fn parts(cluster: &Cluster) -> Parts {
             })
             .collect(),
         has_two_networks: cluster.has_two_networks(),
+        direct_links: cluster.direct_links(),
         change: None,
     }
 }

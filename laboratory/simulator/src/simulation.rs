@@ -163,7 +163,7 @@ impl Simulation {
         let mut simulation = Self {
             links: Links::new(
                 (parts.stations.len(), parts.remote_ios.len()),
-                (parts.roster(), parts.has_two_networks),
+                (parts.roster(), parts.has_two_networks, parts.direct_links),
                 network,
                 seed,
             ),

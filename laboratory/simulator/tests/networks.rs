@@ -52,7 +52,7 @@ fn one_of_two_networks_that_loses_or_delays_frames_costs_no_cycle() {
         ..late
     };
     for (network, what) in [(late, "late"), (lossy, "lossy"), (both, "late and lossy")] {
-        for over in Via::BOTH {
+        for over in Via::NETWORKS {
             let mut simulation = cell(true, Network { over: Some(over), ..network });
             simulation.run(cycles(), PATIENCE, &mut nothing_seen).expect("synchronised");
             assert_all_direct(&simulation, cycles(), what);
@@ -63,7 +63,8 @@ fn one_of_two_networks_that_loses_or_delays_frames_costs_no_cycle() {
 /// A network is down for the whole run, or goes down and comes back every 50 ms.
 #[test]
 fn one_of_two_networks_that_is_down_or_flaps_costs_no_cycle() {
-    for (flaps, network) in [false, true].into_iter().flat_map(|it| Via::BOTH.map(|via| (it, via)))
+    for (flaps, network) in
+        [false, true].into_iter().flat_map(|it| Via::NETWORKS.map(|via| (it, via)))
     {
         let mut simulation = cell(true, Network::default());
         simulation.run(0, PATIENCE, &mut nothing_seen).expect("synchronised");

@@ -66,7 +66,7 @@ metrics! {
     "late_turns" late_turns: Counter, "Cycles whose last turn came after the deadline";
     "cycle" cycle: Gauge, "The newest cycle, from the origin of the run";
     "survivable_failures" survives: Gauge, "Remaining redundancy: any further failures of stations that would be masked";
-    "network_in_order" networks: Family<OfNetwork, Gauge>, "1 where each member receives over the network, of two, what it receives over the other one, 0 where not";
+    "network_in_order" networks: Family<OfNetwork, Gauge>, "1 where each member receives over the network (1 or 2; 3 for the direct links) what it receives over another one, 0 where not";
     "open_alarms" open_alarms: Gauge, "Alarms that last or are not acknowledged";
     "alarms" alarms: Family<OfAlarms, Gauge>, "Alarms on signals by state and priority";
     "alarm_state" alarm_states: Family<OfAlarm, Gauge>, "1 for the state of the alarm on a signal, 0 for the other states";

@@ -3,7 +3,7 @@
 use understudy_cluster::{Cluster, InputSource};
 use understudy_remote_io::OperatorInput;
 use understudy_typed::{Declared, Point};
-use understudy_wire::{Member, ProgramId, SignalPlace, StationId, StationSet};
+use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, StationId, StationSet};
 
 /// Every member of a cluster with its name: stations by rank, then remote I/Os, then plants.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub struct Members {
     signals: Vec<Vec<NamedSignal>>,
     spare_slots: StationSet,
     have_two_networks: bool,
+    /// Programs whose two remote I/Os a direct link joins.
+    linked: ProgramSet,
 }
 
 /// Input or output of a program, by name.
@@ -69,6 +71,7 @@ impl Members {
                 .collect(),
             spare_slots: cluster.agreement().schedule.spare_slots(),
             have_two_networks: cluster.has_two_networks(),
+            linked: cluster.direct_links(),
             ..Self::new(cluster.members().map(|member| (member, name(member))))
         }
     }
@@ -83,12 +86,18 @@ impl Members {
             signals: Vec::new(),
             spare_slots: StationSet::EMPTY,
             have_two_networks: false,
+            linked: ProgramSet::EMPTY,
         }
     }
 
     /// Whether each frame is sent over two networks.
     pub fn have_two_networks(&self) -> bool {
         self.have_two_networks
+    }
+
+    /// Whether a direct link joins a member with the other remote I/O of its program.
+    pub fn is_linked(&self, member: Member) -> bool {
+        member.sampled_program().is_some_and(|program| self.linked.contains(program))
     }
 
     /// Members with their names, in ascending order.

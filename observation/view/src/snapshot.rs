@@ -82,7 +82,7 @@ pub struct Snapshot {
     pub plants: Vec<PlantSnapshot>,
     /// The remaining redundancy.
     pub margin: MarginSnapshot,
-    /// The networks of a cluster with two; none of a cluster with one.
+    /// The networks and the direct links of a cluster with more than one network; none of a cluster with one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub networks: Vec<NetworkSnapshot>,
     /// Times of the newest cycle whose times are known.
@@ -111,15 +111,15 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// What one of two networks has left, in words; nothing in a cluster with one network.
+    /// What two networks and direct links have left, in words; nothing where that is one network in order.
     pub fn networks_text(&self) -> Option<String> {
+        let networks = self.networks.iter().filter(|network| network.network <= 2);
+        let may_fail = networks.clone().count() == 2 && networks.clone().all(|it| it.in_order);
+        let either = may_fail.then_some("either network may fail");
         let faults = self.networks.iter().filter(|network| !network.in_order);
-        let faults: Vec<&str> = faults.map(|network| network.text.as_str()).collect();
-        match (self.networks.is_empty(), faults.is_empty()) {
-            (true, _) => None,
-            (false, true) => Some("either network may fail".to_owned()),
-            (false, false) => Some(faults.join("; ")),
-        }
+        let texts: Vec<&str> =
+            either.into_iter().chain(faults.map(|network| network.text.as_str())).collect();
+        (!texts.is_empty()).then(|| texts.join("; "))
     }
 
     /// The links of every member, by its name.
@@ -387,12 +387,14 @@ pub struct MarginSnapshot {
     pub pairs: Vec<OutcomeSnapshot>,
 }
 
-/// One of two networks.
+/// One of two networks, or the direct links between the remote I/Os of each program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct NetworkSnapshot {
-    /// 1 or 2.
+    /// 1 or 2; 3 for the direct links.
     pub network: u8,
-    /// Whether every member that reports receives over it what it receives over the other one.
+    /// `network 1`, `network 2` or `direct link`.
+    pub name: String,
+    /// Whether every member that reports receives over it what it receives over another one.
     pub in_order: bool,
     /// What is wrong; empty where nothing is.
     pub text: String,

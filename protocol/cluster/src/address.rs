@@ -2,30 +2,52 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 
-/// Where a member listens, as far as that is known: on the network that every cluster has, and on the second one of a cluster with two.
+use understudy_wire::Via;
+
+/// Where a member listens, as far as that is known: on the network that every cluster has, on the second one of a cluster with two, and on the direct link
+/// between the two remote I/Os of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Addresses<A = SocketAddr> {
     /// Address on the first network.
     pub first: Option<A>,
     /// Address on the second network.
     pub second: Option<A>,
+    /// Address on the direct link.
+    pub link: Option<A>,
 }
 
 impl<A> Default for Addresses<A> {
     fn default() -> Self {
-        Self { first: None, second: None }
+        Self { first: None, second: None, link: None }
     }
 }
 
 impl<A> Addresses<A> {
     /// The same, borrowed.
     pub(crate) fn as_ref(&self) -> Addresses<&A> {
-        Addresses { first: self.first.as_ref(), second: self.second.as_ref() }
+        Addresses {
+            first: self.first.as_ref(),
+            second: self.second.as_ref(),
+            link: self.link.as_ref(),
+        }
     }
 
     /// Each value that is there, mapped.
     pub(crate) fn map<B>(self, mut value: impl FnMut(A) -> B) -> Addresses<B> {
-        Addresses { first: self.first.map(&mut value), second: self.second.map(value) }
+        Addresses {
+            first: self.first.map(&mut value),
+            second: self.second.map(&mut value),
+            link: self.link.map(value),
+        }
+    }
+
+    /// Address on a path.
+    pub fn at(self, via: Via) -> Option<A> {
+        match via {
+            Via::First => self.first,
+            Via::Second => self.second,
+            Via::Link => self.link,
+        }
     }
 }
 

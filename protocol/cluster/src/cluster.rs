@@ -22,7 +22,7 @@ use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{Diagnosis, Fallback, PairedInput, SharedOutputs, StopPoints, Wiring};
 use understudy_typed::{Points, Program as TypedProgram};
-use understudy_wire::{Member, ProgramHash, ProgramId, ProgramSet, Roster, StationId};
+use understudy_wire::{Member, ProgramHash, ProgramId, ProgramSet, Roster, StationId, Via};
 
 /// What carries the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -171,6 +171,8 @@ pub struct Twin {
     pub shared_outputs: SharedOutputs,
     /// The device of its own modules; none where the first one has none, or both are at one device.
     pub field: Option<FieldDevice>,
+    /// Whether a cable joins it to the first remote I/O, apart from the networks.
+    pub direct_link: bool,
     /// Where it listens, if the file says so.
     pub addresses: Addresses,
 }
@@ -311,6 +313,26 @@ impl Cluster {
         let programs = (0..).map(ProgramId).zip(&self.remote_ios);
         let paired = programs.filter(|(_, remote_io)| remote_io.twin.is_some());
         paired.map(|(program, _)| program).collect()
+    }
+
+    /// The programs whose two remote I/Os a direct link joins.
+    pub fn direct_links(&self) -> ProgramSet {
+        let programs = (0..).map(ProgramId).zip(&self.remote_ios);
+        let is_joined = |twin: &Twin| twin.direct_link;
+        let joined = programs.filter(|(_, it)| it.twin.as_ref().is_some_and(is_joined));
+        joined.map(|(program, _)| program).collect()
+    }
+
+    /// The paths that a member's frames travel over.
+    pub fn paths(&self, member: Member) -> impl Iterator<Item = Via> + use<> {
+        let links = self.direct_links();
+        let is_linked = member.sampled_program().is_some_and(|program| links.contains(program));
+        let has_two_networks = self.has_two_networks;
+        Via::ALL.into_iter().filter(move |via| match via {
+            Via::First => true,
+            Via::Second => has_two_networks,
+            Via::Link => is_linked,
+        })
     }
 
     /// In the order of their programs; nothing where a program has no simulated plant.

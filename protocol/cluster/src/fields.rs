@@ -172,6 +172,11 @@ impl<'a, 't> Fields<'a, 't> {
         Addresses {
             first: self.address("address", diagnostics),
             second: self.address("second_address", diagnostics),
+            link: self
+                .section
+                .knows("link_address")
+                .then(|| self.address("link_address", diagnostics))
+                .flatten(),
         }
     }
 

@@ -125,6 +125,7 @@ pub(crate) struct TwinSection {
     /// The device of a twin with modules of its own.
     pub(crate) connection: Option<ConnectionText>,
     pub(crate) discrepancy_cycles: u32,
+    pub(crate) direct_link: bool,
     pub(crate) tolerance: Vec<(Placed<String>, Constant)>,
     /// Numeric outputs that both drive, and how each of them does it.
     pub(crate) share: BTreeMap<String, (Range<usize>, Placed<String>)>,
@@ -362,6 +363,7 @@ fn twin<'a, 't>(
             .then(|| fields.connection("modbus", diagnostics))
             .flatten(),
         discrepancy_cycles: fields.count("discrepancy_cycles", diagnostics),
+        direct_link: fields.flag("direct_link", diagnostics),
         tolerance: fields.values("tolerance", diagnostics),
         share: fields.names("share", diagnostics),
         special: special

@@ -197,6 +197,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         key twin: Kind::Twin, "a second remote I/O of the program, which takes over where this one fails, see below and [twin remote I/Os](../how-to/twin-remote-io.md)";
         key address: Kind::Address, "as for a controller";
         key second_address: Kind::Address, "as for a controller";
+        key link_address: Kind::Address, "with a twin and its `direct_link = true`: where it listens on the direct link";
     },
 };
 
@@ -213,8 +214,10 @@ pub(crate) static TWIN: Section = Section {
         key discrepancy_cycles: count(2, MANY_CYCLES, DISCREPANCY_CYCLES), "samples in a row in which the two readings of an input may differ before an alarm is raised; of `parallel`";
         key tolerance: Kind::Values, "greatest difference of two readings of a number that agree, by the name of the input, such as `{ level = 0.5 }`; 0 for all others; of `parallel`";
         key share: Kind::Names, "numeric outputs that both drive together, such as `{ valve = \"half\" }`: what the two modules drive adds up, so each drives half, and the whole while the other one drives nothing; of `parallel`";
+        key direct_link: Kind::Flag, "whether a cable joins the two remote I/Os, apart from the networks; what they send to each other goes over it too, see [the direct link](../how-to/twin-remote-io.md#join-the-two-by-a-direct-link)";
         key address: Kind::Address, "as for a controller";
         key second_address: Kind::Address, "as for a controller";
+        key link_address: Kind::Address, "with `direct_link = true`: where it listens on the direct link";
     },
 };
 
@@ -414,6 +417,11 @@ impl Section {
     pub(crate) fn key(&'static self, name: &str) -> &'static Key {
         let mut keys = self.keys.iter();
         keys.find(|key| key.name == name).expect("the reader asks for keys of the table only")
+    }
+
+    /// Whether it has a key.
+    pub(crate) fn knows(&self, name: &str) -> bool {
+        self.keys.iter().any(|key| key.name == name)
     }
 
     /// What holds where a count is absent; 0 for a key that is none.

@@ -37,6 +37,7 @@
 //! | U0256 | warning: inputs that nothing drives |
 //! | U0258 | warning: a watchdog of a simulated plant that runs out before the twin has taken over |
 //! | U0262 | warning: a twin on the machine of its remote I/O |
+//! | U0263 | a direct link that does not join the two remote I/Os of a program, or that is a network |
 
 mod alarms;
 mod devices;
@@ -350,6 +351,7 @@ fn remote_ios(
     let mut taken = BTreeMap::new();
     for section in sections {
         names.listen(&section.addresses, diagnostics);
+        twins::check_link(&section.addresses, section.twin.as_ref(), diagnostics);
         if let Some(name) = &section.name {
             names.declare(&name.value, name.span.clone(), diagnostics);
         }

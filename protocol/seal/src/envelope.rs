@@ -73,6 +73,11 @@ impl Envelope {
     }
 }
 
+/// The sender that a sealed datagram names; whether it is authentic, only [`crate::Opener`] tells.
+pub fn claimed_sender(datagram: &[u8]) -> Option<Member> {
+    Envelope::read(datagram.first_chunk()?).map(|envelope| envelope.sender)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

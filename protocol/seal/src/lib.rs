@@ -36,7 +36,7 @@ mod revocations;
 mod seal;
 mod window;
 
-pub use envelope::OVERHEAD_BYTES;
+pub use envelope::{OVERHEAD_BYTES, claimed_sender};
 pub use key::{ClusterSecret, FrameKey, KEY_BYTES, Title, TransferKey};
 pub use opener::{Opener, Refusal};
 pub use revocations::Revocations;

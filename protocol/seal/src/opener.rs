@@ -46,8 +46,8 @@ pub enum Refusal {
         /// Its sender.
         sender: Member,
     },
-    /// It was accepted before, and this network has not carried it yet: the copy over the other one of two networks came first.
-    #[error("a frame of {sender:?} came over the other network before")]
+    /// It was accepted before, and this path has not carried it yet: the copy over another one came first.
+    #[error("a frame of {sender:?} came over another network before")]
     SecondCopy {
         /// Its sender.
         sender: Member,
@@ -79,10 +79,10 @@ pub enum Refusal {
 /// A member that this one receives.
 struct Sender {
     key: FrameKey,
-    /// What was accepted, over any network.
+    /// What was accepted, over any path.
     accepted: Window,
-    /// What each network has carried.
-    carried: [Window; 2],
+    /// What each path has carried.
+    carried: [Window; Via::ALL.len()],
 }
 
 /// Opens the datagrams that arrive at one member.
@@ -109,7 +109,8 @@ impl Opener {
             own,
             senders: senders
                 .map(|(member, key)| {
-                    let (accepted, carried) = (Window::default(), [Window::default(); 2]);
+                    let (accepted, carried) =
+                        (Window::default(), [Window::default(); Via::ALL.len()]);
                     (member, Sender { key, accepted, carried })
                 })
                 .collect(),
@@ -146,7 +147,7 @@ impl Opener {
         self.open_over(Via::First, datagram)
     }
 
-    /// The frame in a datagram that came over a network, which is decrypted in place; `None` where it is authentic and for another station.
+    /// The frame in a datagram that came over a path, which is decrypted in place; `None` where it is authentic and for another station.
     ///
     /// # Errors
     /// [`Refusal`]; the datagram then has no effect.
@@ -209,7 +210,7 @@ impl Opener {
 impl Sender {
     fn take(&mut self, via: Via, envelope: Envelope) -> Result<(), Refusal> {
         let Envelope { sender, life, number, .. } = envelope;
-        // What a network carries is judged before what counts: its copy is none of the other network's.
+        // What a path carries is judged before what counts: its copy is none of the others'.
         let is_new_here = self.carried[via.index()].take(life, number) == Verdict::Taken;
         match self.accepted.take(life, number) {
             Verdict::Taken => Ok(()),

@@ -400,7 +400,7 @@ fn a_second_copy_is_no_replay() {
         let copy = opener.open_over(Via::First, &mut datagram.clone());
         assert_eq!(copy, Err(Refusal::SecondCopy { sender: ROBOT }));
     }
-    for via in Via::BOTH {
+    for via in Via::NETWORKS {
         for datagram in &said {
             let again = opener.open_over(via, &mut datagram.clone());
             assert_eq!(again, Err(Refusal::Replayed { sender: ROBOT }));

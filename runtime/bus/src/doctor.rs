@@ -76,11 +76,12 @@ impl Finding {
 
 /// Whether a member can listen where it should: for its frames over `link`, and by TCP for its operators.
 pub fn examine_ports(endpoints: &Endpoints, link: LinkKind) -> Vec<Finding> {
-    let addresses = endpoints.own().addresses();
-    addresses.flat_map(|address| examine_ports_at(address, link)).collect()
+    let paths = endpoints.own().paths();
+    paths.flat_map(|(via, address)| examine_ports_at(address, via, link)).collect()
 }
 
-fn examine_ports_at(operators: SocketAddr, link: LinkKind) -> Vec<Finding> {
+/// Operators call on the networks only.
+fn examine_ports_at(operators: SocketAddr, via: Via, link: LinkKind) -> Vec<Finding> {
     let frames = match link.frames_address(operators) {
         Ok(frames) => frames,
         Err(error) => {
@@ -96,7 +97,8 @@ fn examine_ports_at(operators: SocketAddr, link: LinkKind) -> Vec<Finding> {
         LinkKind::Udp => ("UDP", frames, UdpSocket::bind(frames).map(drop)),
         LinkKind::Zenoh => ("TCP", frames, TcpListener::bind(frames).map(drop)),
     };
-    let bound = [bound, ("TCP", operators, TcpListener::bind(operators).map(drop))];
+    let calls = || ("TCP", operators, TcpListener::bind(operators).map(drop));
+    let bound = [bound].into_iter().chain(via.network().map(|_| calls()));
     let finding = |(protocol, address, bound): (&str, SocketAddr, std::io::Result<()>)| match bound
     {
         Ok(()) => Finding::good("ports", format!("{address} is free ({protocol})")),
@@ -118,7 +120,7 @@ fn examine_ports_at(operators: SocketAddr, link: LinkKind) -> Vec<Finding> {
             ),
         },
     };
-    bound.into_iter().map(finding).collect()
+    bound.map(finding).collect()
 }
 
 /// What a firewall has to let through to the member with this address.
@@ -148,10 +150,11 @@ pub fn examine_peers(
     let mut heard: BTreeMap<Member, ConfigurationHash> = BTreeMap::new();
     let mut heard_over: BTreeSet<(Member, Via)> = BTreeSet::new();
     let mut refused: BTreeMap<Option<Member>, String> = BTreeMap::new();
-    let networks = endpoints.own().addresses().count();
-    let expected = endpoints.senders().count() * networks;
+    let paths = endpoints.paths();
+    let senders = paths.iter().flat_map(|(via, on)| on.senders().map(|peer| (peer.member, *via)));
+    let expected: BTreeSet<(Member, Via)> = senders.collect();
     let mut bytes = Vec::new();
-    while clock.now() < end && heard_over.len() < expected {
+    while clock.now() < end && !heard_over.is_superset(&expected) {
         while let Some(via) = opened.receive(&mut bytes) {
             match guard.open(via, &mut bytes) {
                 Ok(Opened::Frame(frame)) if frame.header.cluster == endpoints.cluster() => {
@@ -180,16 +183,24 @@ pub fn examine_peers(
             let name = format!("{} ({})", peer.name, peer.address);
             match (heard.get(&peer.member), refused.get(&Some(peer.member))) {
                 (Some(theirs), _) if *theirs == configuration => {
-                    let of = |via: &Via| heard_over.contains(&(peer.member, *via));
-                    let unheard = Via::BOTH.into_iter().take(networks).find(|via| !of(via));
-                    match unheard {
-                        None => Finding::good("peer", format!("{name} is heard")),
-                        Some(via) => Finding::trouble(
-                            "networks",
-                            Health::Bad,
-                            format!("{name} is heard over network {} and not over network {via}", via.other()),
-                            format!("check the cable, the switch and the addresses of network {via} on both machines"),
-                        ),
+                    let over = |heard: bool| {
+                        let paths = expected.iter().filter(|(member, _)| *member == peer.member);
+                        let found = paths.filter(|path| heard_over.contains(path) == heard);
+                        found.map(|(_, via)| via.to_string()).collect::<Vec<String>>()
+                    };
+                    match over(false) {
+                        unheard if unheard.is_empty() => {
+                            Finding::good("peer", format!("{name} is heard"))
+                        }
+                        unheard => {
+                            let unheard = unheard.join(" and ");
+                            Finding::trouble(
+                                "networks",
+                                Health::Bad,
+                                format!("{name} is heard over {} and not over {unheard}", over(true).join(" and ")),
+                                format!("check the cable, the switch and the addresses of {unheard} on both machines"),
+                            )
+                        }
                     }
                 }
                 (Some(theirs), _) => Finding::trouble(

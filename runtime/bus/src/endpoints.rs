@@ -6,7 +6,7 @@ use std::net::{SocketAddr, SocketAddrV4, TcpStream};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{ClusterHash, Member, Roster, Topic};
+use understudy_wire::{ClusterHash, Member, Roster, Topic, Via};
 
 use crate::error::BusError;
 
@@ -22,6 +22,9 @@ pub struct Peer {
     /// The same on the second network, in a cluster with two.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second: Option<SocketAddr>,
+    /// The same on the direct link to the other remote I/O of its program, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<SocketAddr>,
 }
 
 impl Peer {
@@ -46,9 +49,24 @@ impl Peer {
         Err(failure)
     }
 
-    /// Where it listens, on each network.
+    /// Where it takes calls: on each network.
     pub fn addresses(&self) -> impl Iterator<Item = SocketAddr> + use<> {
         [self.address].into_iter().chain(self.second)
+    }
+
+    /// Where it listens for frames over a path.
+    pub fn at(&self, via: Via) -> Option<SocketAddr> {
+        match via {
+            Via::First => Some(self.address),
+            Via::Second => self.second,
+            Via::Link => self.link,
+        }
+    }
+
+    /// Where it listens for frames, over each path.
+    pub fn paths(&self) -> impl Iterator<Item = (Via, SocketAddr)> + use<> {
+        let addresses = Via::ALL.map(|via| self.at(via).map(|address| (via, address)));
+        addresses.into_iter().flatten()
     }
 }
 
@@ -63,8 +81,8 @@ pub struct Endpoints {
     others: Vec<Peer>,
     roster: Roster,
     multicast: Option<SocketAddrV4>,
-    /// Whether there is another network, of which these are the endpoints too.
-    is_one_of_two: bool,
+    /// Whether the member is on other paths too.
+    is_one_of_several: bool,
 }
 
 /// The first group of the second network: the same at the next port.
@@ -85,7 +103,7 @@ impl Endpoints {
     ) -> Result<Self, BusError> {
         let mut taken: BTreeMap<SocketAddr, &str> = BTreeMap::new();
         for peer in &members {
-            for address in peer.addresses() {
+            for (_, address) in peer.paths() {
                 if let Some(first) = taken.insert(address, &peer.name) {
                     return Err(BusError::SharedAddress {
                         first: first.to_owned(),
@@ -98,8 +116,8 @@ impl Endpoints {
         let (mut own_peers, others): (Vec<Peer>, Vec<Peer>) =
             members.into_iter().partition(|peer| peer.member == own);
         let own = own_peers.pop().ok_or(BusError::NoAddress { member: own })?;
-        let is_one_of_two = own.second.is_some();
-        Ok(Self { cluster, own, others, roster, multicast: None, is_one_of_two })
+        let is_one_of_several = own.paths().count() > 1;
+        Ok(Self { cluster, own, others, roster, multicast: None, is_one_of_several })
     }
 
     /// The same with the address of the first multicast group, where the network between the members has multicast.
@@ -108,23 +126,36 @@ impl Endpoints {
         Self { multicast: first, ..self }
     }
 
-    /// Where everybody is on the second network, where this member is on it; a member that is not receives nothing there.
-    pub fn on_second_network(&self) -> Option<Self> {
-        let there =
-            |peer: &Peer| Some(Peer { address: peer.second?, second: None, ..peer.clone() });
+    /// The members on a path, and where, where this member is on it; a member that is not receives nothing there. On the direct link are the two remote
+    /// I/Os of a program.
+    pub fn over(&self, via: Via) -> Option<Self> {
+        if via == Via::First {
+            return Some(self.clone());
+        }
+        let there = |peer: &Peer| {
+            let address = peer.at(via)?;
+            Some(Peer { address, second: None, link: None, ..peer.clone() })
+        };
+        let partner = self.own.member.partner();
+        let is_joined = |peer: &&Peer| via != Via::Link || Some(peer.member) == partner;
         Some(Self {
             own: there(&self.own)?,
-            others: self.others.iter().filter_map(there).collect(),
-            multicast: self.multicast.and_then(next_port),
+            others: self.others.iter().filter(is_joined).filter_map(there).collect(),
+            multicast: self.multicast.and_then(next_port).filter(|_| via != Via::Link),
             cluster: self.cluster,
             roster: self.roster.clone(),
-            is_one_of_two: true,
+            is_one_of_several: true,
         })
     }
 
-    /// Whether this is one of two networks, so that the other one carries the frames where this one does not.
-    pub(crate) fn is_one_of_two(&self) -> bool {
-        self.is_one_of_two
+    /// Each path that this member is on, with the members on it.
+    pub(crate) fn paths(&self) -> Vec<(Via, Self)> {
+        Via::ALL.into_iter().filter_map(|via| Some((via, self.over(via)?))).collect()
+    }
+
+    /// Whether this is one of several paths, so that the others carry frames where this one does not.
+    pub(crate) fn is_one_of_several(&self) -> bool {
+        self.is_one_of_several
     }
 
     /// The first multicast group.
@@ -210,6 +241,7 @@ mod tests {
                 name: format!("{place}"),
                 address: ([127, 0, 0, 1], 7000 + place as u16).into(),
                 second: None,
+                link: None,
             })
             .collect()
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use understudy_seal::{Opener, Refusal, Seal};
+use understudy_seal::{Opener, Refusal, Seal, claimed_sender};
 use understudy_wire::{Configurations, Frame, FrameError, Member, Via, decode};
 
 use crate::refused_as::RefusedAs;
@@ -140,7 +140,15 @@ impl Guard {
         })
     }
 
-    /// What a datagram is that came over a network. Without keys a second copy is a frame like its first.
+    /// The sender that a datagram names, be it true or not.
+    pub(crate) fn claimed_sender(&self, datagram: &[u8]) -> Option<Member> {
+        match self {
+            Self::Off => decode(datagram).ok().map(|frame| frame.header.sender),
+            Self::Keys(_) => claimed_sender(datagram),
+        }
+    }
+
+    /// What a datagram is that came over a path. Without keys a second copy is a frame like its first.
     pub(crate) fn open(&mut self, via: Via, datagram: &mut [u8]) -> Result<Opened, Refused> {
         match self {
             Self::Off => {

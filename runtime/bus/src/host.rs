@@ -50,7 +50,7 @@ pub struct Summary {
     pub frames_said: u64,
     /// Frames that it heard, copies included.
     pub frames_heard: u64,
-    /// Second copies of frames, over the other one of two networks.
+    /// Further copies of frames, over another path than the first one.
     #[serde(default)]
     pub second_copies: u64,
     /// Datagrams that were no frames, or did not count.
@@ -69,7 +69,7 @@ pub struct Host<'a, M: Machine> {
     pub machine: &'a mut M,
     /// Carries its frames.
     pub link: &'a mut dyn Link,
-    /// Which copy of a frame counts, where the link has two networks.
+    /// Which copy of a frame counts, where the link has several paths.
     pub networks: Option<NetworkReception>,
     /// Closes and opens them.
     pub guard: &'a mut Guard,
@@ -166,7 +166,7 @@ impl<M: Machine> Host<'_, M> {
             }
             if self.networks.is_some() {
                 let unplugged = self.orders.unplugged();
-                for via in Via::BOTH {
+                for via in Via::ALL {
                     self.link.plug(via, !unplugged[via.index()]);
                 }
             }
@@ -302,6 +302,14 @@ impl<M: Machine> Host<'_, M> {
             let Some(via) = self.link.receive(&mut round.received) else {
                 return taken;
             };
+            // A frame that is cut from a network has not arrived, so that its copy over the direct link counts.
+            if via != Via::Link
+                && self.orders.has_cuts()
+                && let Some(sender) = self.guard.claimed_sender(&round.received)
+                && self.orders.is_cut(sender)
+            {
+                continue;
+            }
             self.look_again(round);
             let now = self.clock.now();
             let datagram =
@@ -315,7 +323,6 @@ impl<M: Machine> Host<'_, M> {
             }
             match opened {
                 Ok(Opened::ForAnother | Opened::SecondCopy(_)) => {}
-                Ok(Opened::Frame(frame)) if self.orders.is_cut(frame.header.sender) => {}
                 Ok(Opened::Frame(frame)) => {
                     round.summary.frames_heard += 1;
                     if let Some(unreceived) = &mut round.unreceived
@@ -358,7 +365,7 @@ impl<M: Machine> Host<'_, M> {
         INPUTS_IN_A_ROW
     }
 
-    /// Whether an authentic datagram came over the other network before; it is counted for the network that it came over now.
+    /// Whether an authentic datagram came over another path before; it is counted for the path that it came over now.
     fn is_second_copy(
         &mut self,
         now: Time,
@@ -377,7 +384,7 @@ impl<M: Machine> Host<'_, M> {
         };
         let arrival = networks.note(now, via, datagram);
         let is_second = is_second || matches!(arrival, Arrival::Second { .. });
-        // One that is so late that its first copy is forgotten counts for no network.
+        // One that is so late that its first copy is forgotten counts for no path.
         if let Some(sender) = sender
             && (arrival != Arrival::First || !is_second)
         {

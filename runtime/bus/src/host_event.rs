@@ -167,18 +167,18 @@ pub enum HostEvent {
         /// Which bound, for the last one.
         reason: String,
     },
-    /// What this member receives over one of two networks has changed. Each time all peers of which it is not in order are named.
+    /// What this member receives over one of several paths has changed. Each time all peers of which it is not in order are named.
     NetworkReception {
-        /// Which network.
+        /// Which path: 1 or 2 for a network, 3 for the direct link.
         network: Via,
-        /// Peers of which nothing arrives over it in time, while the other network carries their frames.
+        /// Peers of which nothing arrives over it in time, while another path carries their frames.
         lost: Vec<Member>,
-        /// Peers of which less arrives over it in time than over the other one.
+        /// Peers of which less arrives over it in time than over another one.
         impaired: Vec<Member>,
     },
     /// No configured peer was received for so long, or one that is connected was not, that the link was closed and opened anew.
     LinkReopened {
-        /// Over which of two networks it is.
+        /// Over which of several paths it is.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         network: Option<Via>,
         /// How long, in milliseconds.
@@ -189,7 +189,7 @@ pub enum HostEvent {
     },
     /// The same, and the link could not be opened: no frame is sent or received. It is tried again.
     LinkFailed {
-        /// Over which of two networks it is.
+        /// Over which of several paths it is.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         network: Option<Via>,
         /// How long, in milliseconds.

@@ -11,7 +11,7 @@ use understudy_wire::{Frame, Member, Via, ZENOH_PORT_OFFSET};
 
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
-use crate::two_networks::TwoNetworks;
+use crate::paths::Paths;
 use crate::udp::UdpLink;
 use crate::zenoh_link::ZenohLink;
 
@@ -32,7 +32,7 @@ pub trait Link: Send {
     /// What happened since the start.
     fn counters(&self) -> LinkCounters;
 
-    /// Lets nothing more pass over one of two networks, in either direction, or everything again; a link over one network has nothing to
+    /// Lets nothing more pass over one of several paths, in either direction, or everything again; a link over one network has nothing to
     /// pull.
     fn plug(&mut self, _: Via, _is_plugged: bool) {}
 
@@ -45,7 +45,7 @@ pub trait Link: Send {
 /// A link received none of its peers, or not one that is connected, and was closed and opened anew.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reopening {
-    /// Over which of two networks it is.
+    /// Over which of several paths it is.
     pub via: Option<Via>,
     /// How long no peer was received, or `peer` was not.
     pub silence: Duration,
@@ -95,18 +95,19 @@ impl LinkKind {
         Ok(SocketAddr::new(address.ip(), port))
     }
 
-    /// Opens the link of one member, over both networks where there are two.
+    /// Opens the link of one member, over each path that it is on.
     ///
     /// # Errors
     /// [`BusError::PortInUse`], [`BusError::Listen`], [`BusError::NoZenohPort`] or [`BusError::Zenoh`].
     pub fn open(self, endpoints: &Endpoints) -> Result<Box<dyn Link>, BusError> {
-        match endpoints.on_second_network() {
-            None => self.open_one(endpoints),
-            Some(second) => Ok(Box::new(TwoNetworks::open(self, endpoints, &second)?)),
+        let paths = endpoints.paths();
+        match paths.len() {
+            1 => self.open_one(endpoints),
+            _ => Ok(Box::new(Paths::open(self, paths)?)),
         }
     }
 
-    /// Opens the link over one network.
+    /// Opens the link over one path.
     pub(crate) fn open_one(self, endpoints: &Endpoints) -> Result<Box<dyn Link>, BusError> {
         Ok(match self {
             Self::Zenoh => Box::new(ZenohLink::open(endpoints)?),

@@ -121,7 +121,7 @@ where
     let mut rights = if real_time { Rights::claim() } else { Rights::unclaimed() };
     let raises = rights.real_time;
     let mut link = kind.open(&endpoints)?;
-    let networks = own.second.map(|_| NetworkReception::new(clock.now(), period));
+    let networks = NetworkReception::of(clock.now(), period, &endpoints);
     if real_time {
         rights.lock();
     }

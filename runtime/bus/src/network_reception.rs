@@ -1,16 +1,17 @@
-//! What a member receives over each of two networks, and which copy of a frame counts.
+//! What a member receives over each of several paths (two networks, the direct link to the other remote I/O of its program), and which copy of a frame
+//! counts.
 //!
-//! The first copy of a datagram counts; the one over the other network is its *second copy*, and dropped. Each copy is counted for the network that
-//! carried it before anything is dropped, so a network is seen to be lost while the other one carries everything.
+//! The first copy of a datagram counts; one over another path is a *second copy*, and dropped. Each copy is counted for the path that
+//! carried it before anything is dropped, so a network is seen to be lost while another path carries everything.
 //!
-//! | a network from one peer, in [`JUDGED_EVERY`] | is |
+//! | a path from one peer, in [`JUDGED_EVERY`] | is |
 //! |---|---|
-//! | carried no frame that came over the other one, or each too late | lost |
+//! | carried no frame that came over another one, or each too late | lost |
 //! | carried less than [`WELL_PERCENT`] of them in time | impaired |
 //! | carried more, for [`WELL_AGAIN`] such times after it was lost or impaired | in order |
 //!
-//! A peer of which nothing arrives over either network is down as long as other peers are received: nothing is said of the networks to it.
-//! Where no peer is received any more, both networks are lost.
+//! A peer of which nothing arrives over any path is down as long as other peers are received: nothing is said of the paths to it, nor of the only path
+//! to a peer. Where no peer is received any more, all paths are lost.
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hasher};
@@ -18,6 +19,7 @@ use std::time::Duration;
 
 use understudy_wire::{Member, Time, Via};
 
+use crate::endpoints::Endpoints;
 use crate::host_event::HostEvent;
 
 /// How often the networks are judged.
@@ -28,24 +30,27 @@ const FEWEST_FRAMES: u32 = 8;
 const WELL_PERCENT: u32 = 90;
 /// Times in a row that a network is in order before that is reported.
 const WELL_AGAIN: u8 = 4;
-/// Times in a row without a frame of a peer over any network after which nothing is said of the networks to it: the peer is down.
+/// Times in a row without a frame of a peer over any path after which nothing is said of the paths to it: the peer is down.
 const SILENT_FOR: u8 = 4;
-/// Times in a row without a frame of any peer after which both networks are lost.
+/// Times in a row without a frame of any peer after which all paths are lost.
 const DEAF_AFTER: u8 = 2;
 /// Datagrams that are remembered: those of five cycles of 64 programs, and more.
 const REMEMBERED: usize = 4096;
+
+/// Number of paths.
+const PATHS: usize = Via::ALL.len();
 
 /// Which copy of a datagram this is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Arrival {
     /// The first that arrives.
     First,
-    /// It came over the other network before.
+    /// It came over another path before.
     Second {
         /// Whether it came within the time that a frame is of use.
         in_time: bool,
     },
-    /// It came over this network before: the sender or another device has sent it again.
+    /// It came over this path before: the sender or another device has sent it again.
     Again,
 }
 
@@ -54,16 +59,16 @@ pub(crate) enum Arrival {
 struct Seen {
     datagram: u64,
     at: Time,
-    over: [bool; 2],
+    over: [bool; PATHS],
 }
 
 /// What came of one peer since it was last judged.
 #[derive(Debug, Default)]
 struct Received {
     frames: u32,
-    over: [u32; 2],
-    state: [State; 2],
-    well: [u8; 2],
+    over: [u32; PATHS],
+    state: [State; PATHS],
+    well: [u8; PATHS],
     silent: u8,
 }
 
@@ -75,9 +80,13 @@ enum State {
     Lost,
 }
 
-/// What one member receives over each of two networks.
+/// What one member receives over each of several paths.
 #[derive(Debug)]
 pub struct NetworkReception {
+    /// Whether there are two networks.
+    has_two_networks: bool,
+    /// The other remote I/O of the program, where a direct link joins the two.
+    linked: Option<Member>,
     seen: Box<[Seen]>,
     /// A second copy that comes later than this after the first one is too late.
     patience: Duration,
@@ -85,14 +94,24 @@ pub struct NetworkReception {
     judged: Time,
     /// Times in a row without a frame of any peer.
     silent: u8,
-    /// What was reported, by network: the peers of which it is lost, and of which it is impaired.
-    reported: [[Vec<Member>; 2]; 2],
+    /// What was reported, by path: the peers of which it is lost, and of which it is impaired.
+    reported: [[Vec<Member>; 2]; PATHS],
 }
 
 impl NetworkReception {
-    /// Nothing received yet; a copy counts for its network where it comes within `patience` of the first one.
-    pub fn new(now: Time, patience: Duration) -> Self {
+    /// Nothing received yet; a copy counts for its path where it comes within `patience` of the first one. Nothing for a member on one path.
+    pub fn of(now: Time, patience: Duration, endpoints: &Endpoints) -> Option<Self> {
+        let own = endpoints.own();
+        let linked = own.member.partner().filter(|_| own.link.is_some());
+        let has_two_networks = own.second.is_some();
+        (has_two_networks || linked.is_some())
+            .then(|| Self::new(now, patience, has_two_networks, linked))
+    }
+
+    fn new(now: Time, patience: Duration, has_two_networks: bool, linked: Option<Member>) -> Self {
         Self {
+            has_two_networks,
+            linked,
             seen: vec![Seen::default(); REMEMBERED].into(),
             patience,
             peers: BTreeMap::new(),
@@ -113,8 +132,8 @@ impl NetworkReception {
     pub(crate) fn note(&mut self, now: Time, via: Via, datagram: u64) -> Arrival {
         let seen = &mut self.seen[datagram as usize % REMEMBERED];
         let place = via.index();
-        if seen.datagram != datagram || seen.over == [false; 2] {
-            *seen = Seen { datagram, at: now, over: [false; 2] };
+        if seen.datagram != datagram || seen.over == [false; PATHS] {
+            *seen = Seen { datagram, at: now, over: [false; PATHS] };
             seen.over[place] = true;
             return Arrival::First;
         }
@@ -124,7 +143,7 @@ impl NetworkReception {
         Arrival::Second { in_time: now.since(seen.at) <= self.patience }
     }
 
-    /// Counts a copy for the network that carried it.
+    /// Counts a copy for the path that carried it.
     pub(crate) fn count(&mut self, sender: Member, via: Via, arrival: Arrival) {
         let received = self.peers.entry(sender).or_default();
         match arrival {
@@ -146,15 +165,22 @@ impl NetworkReception {
         let none = self.peers.values().all(|received| received.frames == 0);
         self.silent = if none { self.silent.saturating_add(1) } else { 0 };
         let is_deaf = self.silent >= DEAF_AFTER;
-        for received in self.peers.values_mut() {
+        let (has_two_networks, linked) = (self.has_two_networks, self.linked);
+        for (member, received) in &mut self.peers {
+            let is_joined = |via: &Via| match via {
+                Via::First => true,
+                Via::Second => has_two_networks,
+                Via::Link => linked == Some(*member),
+            };
+            let paths = Via::ALL.into_iter().filter(is_joined);
             match (none, is_deaf) {
-                (false, _) => received.judge(),
-                (true, true) => received.state = [State::Lost; 2],
+                (false, _) => received.judge(paths),
+                (true, true) => paths.for_each(|via| received.state[via.index()] = State::Lost),
                 (true, false) => {}
             }
         }
         let mut changes = Vec::new();
-        for via in Via::BOTH {
+        for via in Via::ALL {
             let of = |state| {
                 let peers = self.peers.iter();
                 let found = peers.filter(|(_, received)| received.state[via.index()] == state);
@@ -173,7 +199,7 @@ impl NetworkReception {
 }
 
 impl Received {
-    fn judge(&mut self) {
+    fn judge(&mut self, paths: impl Iterator<Item = Via>) {
         if self.frames == 0 {
             self.silent = self.silent.saturating_add(1);
             if self.silent == SILENT_FOR {
@@ -185,7 +211,7 @@ impl Received {
         if self.frames < FEWEST_FRAMES {
             return;
         }
-        for place in 0..2 {
+        for place in paths.map(Via::index) {
             let found = match self.over[place] {
                 0 => State::Lost,
                 over if over * 100 < self.frames * WELL_PERCENT => State::Impaired,
@@ -201,13 +227,13 @@ impl Received {
                 (*state, *well) = (found, 0);
             }
         }
-        (self.frames, self.over) = (0, [0; 2]);
+        (self.frames, self.over) = (0, [0; PATHS]);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use understudy_wire::StationId;
+    use understudy_wire::{ProgramId, StationId};
 
     use super::*;
 
@@ -220,10 +246,10 @@ mod tests {
         seconds: u32,
         late: impl Fn(u32, Via) -> Option<Duration>,
     ) -> Vec<(u64, u8, usize, usize)> {
-        let mut reception = NetworkReception::new(Time(0), PERIOD);
+        let mut reception = NetworkReception::new(Time(0), PERIOD, true, None);
         let mut copies = Vec::new();
         for period in 0..seconds * 100 {
-            for via in Via::BOTH {
+            for via in Via::NETWORKS {
                 if let Some(late) = late(period, via) {
                     copies.push((Time(0) + PERIOD * period + late, via, u64::from(period) + 1));
                 }
@@ -252,7 +278,7 @@ mod tests {
         // One that is always a little later, and one frame of twenty lost on each.
         let a_little = |period, via| match via {
             Via::First => (period % 20 != 3).then_some(Duration::ZERO),
-            Via::Second => (period % 20 != 9).then_some(PERIOD / 2),
+            _ => (period % 20 != 9).then_some(PERIOD / 2),
         };
         assert_eq!(reports(20, a_little), []);
     }
@@ -295,7 +321,7 @@ mod tests {
 
     #[test]
     fn nothing_is_said_of_the_networks_to_a_peer_that_is_down() {
-        let mut reception = NetworkReception::new(Time(0), PERIOD);
+        let mut reception = NetworkReception::new(Time(0), PERIOD, true, None);
         let mut found = Vec::new();
         for period in 0..2000_u32 {
             let now = Time(0) + PERIOD * period;
@@ -303,7 +329,7 @@ mod tests {
                 let arrival = reception.note(now, Via::First, u64::from(period) + 1);
                 reception.count(PRESS, Via::First, arrival);
             }
-            for via in Via::BOTH {
+            for via in Via::NETWORKS {
                 let arrival = reception.note(now, via, u64::from(period) + 10_000);
                 reception.count(Member::Station(StationId(2)), via, arrival);
             }
@@ -322,11 +348,11 @@ mod tests {
                 let lost = if via == Via::First { &first } else { &second };
                 (!lost.contains(&period)).then_some(Duration::ZERO)
             };
-            let mut reception = NetworkReception::new(Time(0), PERIOD);
+            let mut reception = NetworkReception::new(Time(0), PERIOD, true, None);
             let mut found = Vec::new();
             for period in 0..2000_u32 {
                 let now = Time(0) + PERIOD * period;
-                for via in Via::BOTH.into_iter().filter(|via| late(period, *via).is_some()) {
+                for via in Via::NETWORKS.into_iter().filter(|via| late(period, *via).is_some()) {
                     let arrival = reception.note(now, via, u64::from(period) + 1);
                     reception.count(PRESS, via, arrival);
                 }
@@ -360,9 +386,52 @@ mod tests {
         }
     }
 
+    /// The direct link is judged for the one peer on it, and the only path to a peer is not.
+    #[test]
+    fn the_direct_link_is_judged_for_the_other_remote_io_alone() {
+        let twin = Member::Twin(ProgramId(0));
+        let check = |has_two_networks: bool, lost: Via| {
+            let mut reception =
+                NetworkReception::new(Time(0), PERIOD, has_two_networks, Some(twin));
+            let networks = if has_two_networks { 2 } else { 1 };
+            let mut found = Vec::new();
+            for period in 0..1000_u32 {
+                let now = Time(0) + PERIOD * period;
+                let is_lost = |via| via == lost && (300..600).contains(&period);
+                for (peer, paths) in
+                    [(PRESS, &Via::NETWORKS[..networks]), (twin, &Via::NETWORKS[..networks])]
+                {
+                    let link = (peer == twin).then_some(Via::Link);
+                    let carrying = paths.iter().copied().chain(link);
+                    for via in carrying.filter(|via| !is_lost(*via)) {
+                        let datagram = u64::from(period) * 2 + u64::from(peer == twin) + 1;
+                        let arrival = reception.note(now, via, datagram);
+                        reception.count(peer, via, arrival);
+                    }
+                }
+                found.extend(reception.judge(now));
+            }
+            found
+        };
+        let reception = |network, lost: &[Member]| {
+            let lost = lost.to_vec();
+            HostEvent::NetworkReception { network, lost, impaired: Vec::new() }
+        };
+        for has_two_networks in [false, true] {
+            let found = check(has_two_networks, Via::Link);
+            assert_eq!(found, [reception(Via::Link, &[twin]), reception(Via::Link, &[])]);
+        }
+        // A station of which nothing arrives over its only path is down.
+        let found = check(false, Via::First);
+        assert_eq!(found, [reception(Via::First, &[twin]), reception(Via::First, &[])]);
+        let both = vec![PRESS, twin];
+        let found = check(true, Via::Second);
+        assert_eq!(found, [reception(Via::Second, &both), reception(Via::Second, &[])]);
+    }
+
     #[test]
     fn copies_are_told_apart() {
-        let mut reception = NetworkReception::new(Time(0), PERIOD);
+        let mut reception = NetworkReception::new(Time(0), PERIOD, true, None);
         let datagram = NetworkReception::identity(b"turn");
         let now = Time(0) + PERIOD;
         assert_eq!(reception.note(now, Via::Second, datagram), Arrival::First);

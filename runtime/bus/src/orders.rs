@@ -78,24 +78,24 @@ pub struct Cuts {
     #[serde(default, skip_serializing_if = "is_none")]
     twins: ProgramSet,
     #[serde(default, skip_serializing_if = "is_plugged")]
-    unplugged: [bool; 2],
+    unplugged: [bool; Via::ALL.len()],
 }
 
 fn is_none(twins: &ProgramSet) -> bool {
     twins.is_empty()
 }
 
-fn is_plugged(unplugged: &[bool; 2]) -> bool {
-    *unplugged == [false; 2]
+fn is_plugged(unplugged: &[bool; Via::ALL.len()]) -> bool {
+    *unplugged == [false; Via::ALL.len()]
 }
 
 impl Cuts {
-    /// Pulls the cable to one of two networks, or plugs it in again.
+    /// Pulls the cable to a network, or the direct link, or plugs it in again.
     pub fn unplug(&mut self, via: Via, is_unplugged: bool) {
         self.unplugged[via.index()] = is_unplugged;
     }
 
-    /// Cuts the link from a member, or heals it. A plant stays with its remote I/O.
+    /// Cuts the networks between a member and this one, or heals them; the direct link stays. A plant stays with its remote I/O.
     pub fn set(&mut self, member: Member, cut: bool) {
         match (member, cut) {
             (Member::Station(station), true) => self.stations.insert(station),
@@ -106,6 +106,10 @@ impl Cuts {
             (Member::Twin(program), false) => self.twins.remove(program),
             (Member::Plant(_), _) => {}
         }
+    }
+
+    fn has_cuts(self) -> bool {
+        !(self.stations.is_empty() && self.remote_ios.is_empty() && self.twins.is_empty())
     }
 
     pub(crate) fn contains(self, member: Member) -> bool {
@@ -217,13 +221,18 @@ impl Orders {
         self.limiter.take_refused()
     }
 
-    /// Whether the link from a member is cut.
+    /// Whether the networks between a member and this one are cut.
     pub(crate) fn is_cut(&self, member: Member) -> bool {
         self.standing.cuts().contains(member)
     }
 
-    /// By network, whether the cable to it is pulled.
-    pub(crate) fn unplugged(&self) -> [bool; 2] {
+    /// Whether the networks between any member and this one are cut.
+    pub(crate) fn has_cuts(&self) -> bool {
+        self.standing.cuts().has_cuts()
+    }
+
+    /// By path, whether the cable to it is pulled.
+    pub(crate) fn unplugged(&self) -> [bool; Via::ALL.len()] {
         self.standing.cuts().unplugged
     }
 

@@ -41,6 +41,8 @@ use crate::linger::Lingering;
 use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
 use settings::{identity, settings};
+
+pub use settings::{zenoh_runtime, zenoh_runtime_of_follower};
 use silence::{Silence, Silent};
 
 /// Datagrams that wait for the cycle's thread, at most; one of 72 stations and 64 remote I/Os hears fewer in a cycle.
@@ -48,30 +50,6 @@ const QUEUE_FRAMES: usize = 1024;
 
 /// How often each member publishes something.
 const PULSE: Duration = Duration::from_millis(250);
-
-/// The variable of the environment that sets up Zenoh's own threads.
-const RUNTIME: &str = "ZENOH_RUNTIME";
-
-/// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
-/// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do. Over two networks there are
-/// two of each, so that what waits in the session of a network that has failed does not hold up the other one.
-pub fn zenoh_runtime(has_two_networks: bool) -> (&'static str, &'static str) {
-    let threads = match has_two_networks {
-        false => {
-            "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 1))"
-        }
-        true => {
-            "(rx: (worker_threads: 2), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 2))"
-        }
-    };
-    (RUNTIME, threads)
-}
-
-/// The same for a process that only follows members, such as a spare: one thread for everything, since each packet wakes every thread that handles it.
-pub fn zenoh_runtime_of_follower() -> (&'static str, &'static str) {
-    let threads = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), app: (handover: net), net: (worker_threads: 1))";
-    (RUNTIME, threads)
-}
 
 /// A session that closes is waited for so long, at most.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
@@ -129,7 +107,7 @@ impl ZenohLink {
             publishers: Arc::clone(&publishers),
             published: Arc::clone(&published),
             ears,
-            silence: Silence::new(clock.now(), place, endpoints.is_one_of_two()),
+            silence: Silence::new(clock.now(), place, endpoints.is_one_of_several()),
             lingering: Lingering::new()
                 .map_err(|source| BusError::System { what: "a pair of sockets", source })?,
             failed: false,
@@ -476,6 +454,7 @@ mod tests {
             name: name(member),
             address,
             second: None,
+            link: None,
         });
         let peers: Vec<Peer> = peers.collect();
         let endpoints = |own| {

@@ -71,8 +71,7 @@ impl Running {
         reports: &Sender<(Member, Noted<Chat>)>,
     ) -> Self {
         let own = endpoints.own().member;
-        let second = endpoints.own().second;
-        let networks = second.map(|_| NetworkReception::new(Time::default(), PERIOD));
+        let networks = NetworkReception::of(Time::default(), PERIOD, &endpoints);
         let mut link = link.open(&endpoints).expect("a free port");
         let mut guard = guard(own, life, peers);
         let (control, orders) = orders().expect("an eventfd");
@@ -523,12 +522,12 @@ const NOWHERE: &str = "192.0.2.1";
 #[test]
 fn a_member_starts_with_the_network_that_there_is() {
     for link in [LinkKind::Udp, LinkKind::Zenoh] {
-        for missing in Via::BOTH {
+        for missing in Via::NETWORKS {
             let mut peers = peers_on_two_networks();
             let own = &mut peers[0];
             let place = match missing {
                 Via::First => &mut own.address,
-                Via::Second => own.second.as_mut().expect("two"),
+                _ => own.second.as_mut().expect("two"),
             };
             place.set_ip(NOWHERE.parse().expect("an address"));
             let (sender, reports) = channel();

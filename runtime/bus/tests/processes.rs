@@ -108,7 +108,7 @@ impl Process {
     fn start(part: &Part, reports: &Sender<Reports>) -> Self {
         let mut child = Command::new(std::env::current_exe().expect("this program"))
             .args([PART, &serde_json::to_string(part).expect("plain data")])
-            .env(zenoh_runtime(false).0, zenoh_runtime(false).1)
+            .env(zenoh_runtime(1).0, zenoh_runtime(1).1)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

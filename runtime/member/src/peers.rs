@@ -4,7 +4,7 @@ use std::path::Path;
 
 use understudy_bus::Peer;
 use understudy_cluster::{Addresses, Cluster, why_unreachable};
-use understudy_wire::Member;
+use understudy_wire::{Member, Via};
 
 use crate::error::MemberError;
 
@@ -28,7 +28,7 @@ pub fn listed_peers(path: &Path, text: &str) -> Result<Vec<Peer>, MemberError> {
     let peers: Vec<Peer> =
         serde_json::from_str(text).map_err(|error| refused(error.to_string()))?;
     for peer in &peers {
-        for address in peer.addresses() {
+        for (_, address) in peer.paths() {
             if let Some(why) = why_unreachable(address) {
                 return Err(refused(format!("{} has the address {address}: {why}", peer.name)));
             }
@@ -45,17 +45,18 @@ pub fn addressed_peers(cluster: &Cluster) -> Result<Vec<Peer>, MemberError> {
     let name = |member| cluster.member_name(member).unwrap_or_default().to_owned();
     let known: Vec<(Member, Addresses)> =
         cluster.members().map(|member| (member, cluster.addresses(member))).collect();
-    let is_complete = |addresses: &Addresses| {
-        addresses.first.is_some() && addresses.second.is_some() == cluster.has_two_networks()
+    let is_complete = |(member, addresses): &&(Member, Addresses)| {
+        let given = Via::ALL.into_iter().filter(|via| addresses.at(*via).is_some());
+        given.eq(cluster.paths(*member))
     };
-    let lacking = known.iter().filter(|(_, addresses)| !is_complete(addresses));
+    let lacking = known.iter().filter(|it| !is_complete(it));
     let names: Vec<String> = lacking.map(|(member, _)| name(*member)).collect();
     if !names.is_empty() {
         return Err(MemberError::NoAddress { names });
     }
     let peers = known.into_iter().filter_map(|(member, addresses)| {
-        let Addresses { first, second } = addresses;
-        Some(Peer { member, name: name(member), address: first?, second })
+        let Addresses { first, second, link } = addresses;
+        Some(Peer { member, name: name(member), address: first?, second, link })
     });
     Ok(peers.collect())
 }

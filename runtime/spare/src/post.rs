@@ -34,7 +34,7 @@ impl Post {
             command.arg("--retain").arg(retain);
         }
         // The station sets up the threads of its own link.
-        command.env_remove(zenoh_runtime(false).0);
+        command.env_remove(zenoh_runtime(1).0);
         // Its input is closed when the spare ends, however that ends.
         command.stdin(Stdio::piped()).stdout(Stdio::null());
         command.spawn().map(Self)

@@ -11,9 +11,9 @@ const MOST: usize = 100;
 /// What was not in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum NetworkSubject {
-    /// One of two networks.
+    /// One of two networks, or the direct links.
     Network(Via),
-    /// The link of a member, over one of two networks where there are two.
+    /// The link of a member, over one of several paths where there are several.
     Link(Member, Option<Via>),
 }
 

@@ -344,24 +344,45 @@ impl Reader<'_> {
         Some(both.collect())
     }
 
-    /// One action for the cable of this member to a network; with `others`, one for each of the others too.
+    /// One action for the cable of this member to a network, or for its direct link; with `others`, one for each of the others too.
     fn cable(
         &mut self,
         fields: &mut Fields<'_, '_>,
         member: Option<Member>,
         action: impl Fn(Via) -> Action,
     ) -> Option<Vec<(Option<Member>, Action)>> {
-        fields.require(&["network"], &mut self.diagnostics);
-        let others = fields.flag("others", &mut self.diagnostics).unwrap_or(false);
-        let network = fields.format_count("network", &mut self.diagnostics)?;
-        let members = self.members?;
-        if !members.have_two_networks() {
-            self.diagnostics.push(one_network(network.span, "use `cut`"));
-            return None;
+        let is_link = fields.flag("direct_link", &mut self.diagnostics).unwrap_or(false);
+        if !is_link {
+            fields.require(&["network"], &mut self.diagnostics);
         }
-        let via = Via::try_from(network.value as u8).ok()?;
+        let others = fields.flag("others", &mut self.diagnostics).unwrap_or(false);
+        let place = fields.span();
+        let network = match is_link {
+            true => None,
+            false => Some(fields.format_count("network", &mut self.diagnostics)?),
+        };
+        let members = self.members?;
+        let via = match network {
+            None if member.is_some_and(|member| !members.is_linked(member)) => {
+                let message = "no direct link joins this member with another one";
+                let help =
+                    "name a remote I/O whose twin has `direct_link = true` in the cluster file";
+                self.diagnostics.push(Diagnostic::error("U0309", message, place).with_help(help));
+                return None;
+            }
+            None => Via::Link,
+            Some(network) if !members.have_two_networks() => {
+                self.diagnostics.push(one_network(network.span, "use `cut`"));
+                return None;
+            }
+            Some(network) => Via::try_from(network.value as u8).ok()?,
+        };
         let all = members.iter().map(|(peer, _)| peer);
-        let peers = all.filter(|&peer| Some(peer) != member && !matches!(peer, Member::Plant(_)));
+        let is_on = |peer: Member| match via {
+            Via::Link => members.is_linked(peer),
+            _ => !matches!(peer, Member::Plant(_)),
+        };
+        let peers = all.filter(|&peer| Some(peer) != member && is_on(peer));
         let others: Vec<Member> = if others { peers.collect() } else { Vec::new() };
         let own = (None, action(via));
         Some(

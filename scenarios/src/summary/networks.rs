@@ -32,10 +32,10 @@ impl NetworkFaultSummary {
                     true => "any members".to_owned(),
                     false => names.join(", "),
                 };
-                (format!("network {via}"), format!("{what} between {whom}"))
+                (via.name().to_owned(), format!("{what} between {whom}"))
             }
             NetworkSubject::Link(member, via) => {
-                let over = via.map_or_else(String::new, |via| format!(" over network {via}"));
+                let over = via.map_or_else(String::new, |via| format!(" over {via}"));
                 let text = format!("could not open its link{over}: {}", fault.reason);
                 (members.name(member).to_owned(), text)
             }

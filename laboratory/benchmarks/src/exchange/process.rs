@@ -79,8 +79,8 @@ pub(super) fn measure(carrier: Carrier, settings: Settings) -> Result<Exchange, 
         let mut command = own_command().map_err(refused("to find this program"))?;
         command.arg("member");
         command.arg(serde_json::to_string(&part).unwrap_or_default());
-        if std::env::var_os(zenoh_runtime(false).0).is_none() {
-            command.env(zenoh_runtime(false).0, zenoh_runtime(false).1);
+        if std::env::var_os(zenoh_runtime(1).0).is_none() {
+            command.env(zenoh_runtime(1).0, zenoh_runtime(1).1);
         }
         let child = command
             .stdin(Stdio::piped())
@@ -185,7 +185,12 @@ fn members() -> io::Result<Vec<Peer>> {
     let remote_ios = (0..PROGRAMS).map(|program| Member::RemoteIo(ProgramId(program)));
     let members: Vec<Member> = stations.chain(remote_ios).collect();
     let addresses = free_addresses(members.len())?;
-    let peer =
-        |(member, address)| Peer { member, name: format!("{member:?}"), address, second: None };
+    let peer = |(member, address)| Peer {
+        member,
+        name: format!("{member:?}"),
+        address,
+        second: None,
+        link: None,
+    };
     Ok(members.into_iter().zip(addresses).map(peer).collect())
 }

@@ -180,8 +180,13 @@ fn peers(controllers: usize) -> io::Result<Vec<Peer>> {
     let remote_ios = (0..controllers).map(|place| Member::RemoteIo(ProgramId(place as u8)));
     let members: Vec<_> = remote_ios.chain((0..=controllers).map(station)).collect();
     let addresses = free_addresses(members.len())?;
-    let peer =
-        |(member, address)| Peer { member, name: format!("{member:?}"), address, second: None };
+    let peer = |(member, address)| Peer {
+        member,
+        name: format!("{member:?}"),
+        address,
+        second: None,
+        link: None,
+    };
     Ok(members.into_iter().zip(addresses).map(peer).collect())
 }
 

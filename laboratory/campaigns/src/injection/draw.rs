@@ -35,9 +35,12 @@ pub(super) struct Target<'a> {
     pub(super) schedule: &'a Schedule,
     /// Inputs that operators write.
     inputs: Vec<(ProgramId, OperatorInput)>,
-    has_two_networks: bool,
+    /// Paths that may fail: two networks, and the direct links.
+    paths: Vec<Via>,
     /// Programs with a second remote I/O.
     twins: ProgramSet,
+    /// Remote I/Os with a direct link to the other one of their program.
+    linked: Vec<Member>,
     /// Inputs that modules of both remote I/Os read, of one bit.
     paired: Vec<(ProgramId, u16)>,
 }
@@ -59,18 +62,27 @@ impl<'a> Target<'a> {
             paired: paired.collect(),
             schedule: &cluster.agreement().schedule,
             inputs: inputs.collect(),
-            has_two_networks: cluster.has_two_networks(),
+            paths: {
+                let networks = cluster.has_two_networks().then_some(Via::NETWORKS);
+                let link = (!cluster.direct_links().is_empty()).then_some(Via::Link);
+                networks.into_iter().flatten().chain(link).collect()
+            },
+            linked: {
+                let links = cluster.direct_links();
+                let both = |program| [Member::RemoteIo(program), Member::Twin(program)];
+                links.iter().flat_map(both).collect()
+            },
             twins: cluster.twins(),
         }
     }
 
-    /// The kinds that can be drawn: a cluster without operator inputs has no writes, one with one network none that may fail, and one where each input has
+    /// The kinds that can be drawn: a cluster without operator inputs has no writes, one with one path none that may fail, and one where each input has
     /// one module has none that may be stuck.
     pub(super) fn kinds(&self, kinds: &[Kind]) -> Vec<Kind> {
         let kinds = kinds.iter().copied();
         let can_be = |kind: &Kind| match kind {
             Kind::Write => !self.inputs.is_empty(),
-            Kind::NetworkFailure => self.has_two_networks,
+            Kind::NetworkFailure => !self.paths.is_empty(),
             Kind::StuckInput => !self.paired.is_empty(),
             _ => true,
         };
@@ -91,6 +103,8 @@ pub(super) fn draw(
         inputs: &target.inputs,
         twins: target.twins,
         paired: &target.paired,
+        paths: &target.paths,
+        linked: &target.linked,
         cycles: cycles.clone(),
     };
     let mut faultload = Faultload::default();
@@ -127,6 +141,8 @@ struct Draw<'a> {
     inputs: &'a [(ProgramId, OperatorInput)],
     twins: ProgramSet,
     paired: &'a [(ProgramId, u16)],
+    paths: &'a [Via],
+    linked: &'a [Member],
     cycles: Range<u64>,
 }
 
@@ -272,10 +288,14 @@ impl Draw<'_> {
             }
             Kind::Isolation => cuts(&self.others(member), member, phase, from, to),
             Kind::NetworkFailure => {
-                let network = Via::BOTH[self.random.random_range(0..2)];
+                let network = self.one_of(self.paths);
                 let all = self.random.random_range(0..2) == 0;
-                let mut struck = vec![member];
-                struck.extend(self.others(member).into_iter().filter(|_| all));
+                let struck = match (network, all) {
+                    (Via::Link, true) => self.linked.to_vec(),
+                    (Via::Link, false) => vec![self.one_of(self.linked)],
+                    (_, true) => [vec![member], self.others(member)].concat(),
+                    (_, false) => vec![member],
+                };
                 let steps = |at: u64, action| {
                     struck.iter().map(move |&member| Fault { at_cycle: at, phase, member, action })
                 };

@@ -16,7 +16,7 @@ use understudy_remote_io::{
 use understudy_simulator::Parts;
 use understudy_typed::Elementary;
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Image, Moment, ProgramHash, ProgramId, StationId,
+    ClusterHash, ConfigurationHash, Image, Moment, ProgramHash, ProgramId, ProgramSet, StationId,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -223,6 +223,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         fed_by: vec![None; circuits.len()],
         follows: vec![Vec::new(); circuits.len()],
         has_two_networks: false,
+        direct_links: ProgramSet::EMPTY,
         change: Some(Arc::new(change(&programs[0], agreement.configuration))),
     }
 }

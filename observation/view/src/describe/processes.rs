@@ -113,13 +113,13 @@ fn refused_text(order: &RefusedOrder) -> String {
     format!("{owner} orders {order}{signal} at {to}{reason}; refused: {why}{more}")
 }
 
-/// What a member receives over one of two networks.
+/// What a member receives over one of several paths.
 fn reception_text(network: Via, lost: &[Member], impaired: &[Member], members: &Members) -> String {
     let names = |of: &[Member]| {
         let names: Vec<&str> = of.iter().map(|member| members.name(*member)).collect();
         listed(&names)
     };
-    let over = format!("over network {network}");
+    let over = format!("over {network}");
     match (lost.is_empty(), impaired.is_empty()) {
         (true, true) => format!("receives all members {over} again"),
         (false, true) => format!("receives nothing {over} from {}", names(lost)),
@@ -134,9 +134,9 @@ fn reception_text(network: Via, lost: &[Member], impaired: &[Member], members: &
     }
 }
 
-/// Over which of two networks a link is.
+/// Over which of several paths a link is.
 fn over(network: Option<Via>) -> String {
-    network.map_or_else(String::new, |network| format!(" over network {network}"))
+    network.map_or_else(String::new, |network| format!(" over {network}"))
 }
 
 /// What a link did not receive: no member, or one that it is connected to.

@@ -1,4 +1,4 @@
-//! The two networks of a cluster, as its members receive them.
+//! The networks of a cluster and the direct links of its remote I/Os, as its members receive them.
 //!
 //! A network is one alarm, however many members report it. Its text says what is left, then who is affected. A member that cannot open its links is
 //! one alarm, which lasts until all of its links are open.
@@ -14,14 +14,14 @@ use crate::snapshot::NetworkSnapshot;
 /// Alarm of a member that cannot open a link.
 const LINK_FAILED: &str = "link-failed";
 
-/// Alarm of one of two networks.
+/// Alarm of a network or of the direct links.
 const NETWORK_FAULT: &str = "network-fault";
 
-/// By network, the peers of which each member receives nothing over it, and of which it receives less than over the other one.
+/// By path, the peers of which each member receives nothing over it, and of which it receives less than over another one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Networks {
-    faults: [BTreeMap<Member, Faults>; 2],
-    /// By member: its links that cannot be opened, each with the network that it is over, and the text.
+    faults: [BTreeMap<Member, Faults>; Via::ALL.len()],
+    /// By member: its links that cannot be opened, each with the path that it is over, and the text.
     links: BTreeMap<Member, BTreeMap<Option<Via>, String>>,
 }
 
@@ -31,13 +31,8 @@ struct Faults {
     impaired: Vec<Member>,
 }
 
-/// The name under which a network is an alarm.
-fn network_name(via: Via) -> String {
-    format!("network {via}")
-}
-
 impl Model {
-    /// A member has told what it receives over a network.
+    /// A member has told what it receives over a path.
     pub(super) fn network_received(
         &mut self,
         receiver: Member,
@@ -57,7 +52,7 @@ impl Model {
 
     /// The process of a member begins or ends: what it told of the networks holds no more.
     pub(super) fn network_forgets(&mut self, receiver: Member, cycle: i64) {
-        for via in Via::BOTH {
+        for via in Via::ALL {
             if self.networks.faults[via.index()].remove(&receiver).is_some() {
                 self.network_changed(via, cycle);
             }
@@ -105,19 +100,22 @@ impl Model {
         }
     }
 
-    /// The networks as they were in a cycle; none in a cluster with one.
+    /// The networks and the direct links as they were in a cycle; none in a cluster with one network alone.
     pub(crate) fn networks_at(&self, cycle: i64) -> Vec<NetworkSnapshot> {
-        if !self.cluster.has_two_networks() {
+        let paths: BTreeSet<Via> =
+            self.cluster.members().flat_map(|member| self.cluster.paths(member)).collect();
+        if paths.len() < 2 {
             return Vec::new();
         }
         let faults = self.alarms.iter().filter(|alarm| alarm.alarm == NETWORK_FAULT);
         let faults: Vec<Alarm> = faults.filter_map(|alarm| alarm.at(cycle)).collect();
-        let networks = Via::BOTH.into_iter().map(|via| {
-            let name = network_name(via);
+        let networks = paths.into_iter().map(|via| {
+            let name = via.name();
             let lasts = |alarm: &&Alarm| alarm.name == name && alarm.over.is_none();
             let fault = faults.iter().find(lasts);
             NetworkSnapshot {
                 network: via.into(),
+                name: name.to_owned(),
                 in_order: fault.is_none(),
                 text: fault.map_or_else(String::new, |alarm| alarm.text.clone()),
             }
@@ -127,11 +125,11 @@ impl Model {
 
     /// The text of the other network may change with this one.
     fn network_changed(&mut self, via: Via, cycle: i64) {
-        for via in [via, via.other()] {
-            let subject = (network_name(via), NETWORK_FAULT);
+        for via in [via].into_iter().chain(via.other()) {
+            let subject = (via.name().to_owned(), NETWORK_FAULT);
             match self.network_text(via) {
                 None => {
-                    let text = format!("network {via} was not in order; now it is");
+                    let text = format!("{via} was not in order; now it is");
                     self.alarms.over_with(&subject, cycle, text);
                 }
                 Some(text) => self.alarms.raise_or_retell(subject, cycle, text),
@@ -172,12 +170,14 @@ impl Model {
                 false => format!("between {}", listed(&names)),
             }
         };
-        let is_left = self.networks.faults[via.other().index()].is_empty();
-        Some(match is_left {
-            true => {
-                format!("all depends on network {}: over network {via} {what} {whom}", via.other())
+        let over = format!("over {via} {what} {whom}");
+        let other = via.other().filter(|_| self.cluster.has_two_networks());
+        Some(match other {
+            Some(other) if self.networks.faults[other.index()].is_empty() => {
+                format!("all depends on {other}: {over}")
             }
-            false => format!("neither network is in order: over network {via} {what} {whom}"),
+            Some(_) => format!("neither network is in order: {over}"),
+            None => over,
         })
     }
 }

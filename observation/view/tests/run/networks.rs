@@ -7,7 +7,7 @@ use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record, RunEvent};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_view::{Bounds, Model};
-use understudy_wire::{Member, Source, StationId, Via};
+use understudy_wire::{Member, ProgramId, Source, StationId, Via};
 
 use super::support::{example, records, scenario};
 
@@ -98,6 +98,54 @@ fn a_network_is_one_alarm_however_many_members_report_it() {
     let alarms = told.model.snapshot().alarms;
     assert_eq!(alarms.len(), 1, "one, over and not acknowledged: {alarms:?}");
     assert_eq!(alarms[0].text, "network 2 was not in order; now it is");
+}
+
+/// The direct link is an alarm of its own, and takes nothing from the two networks; next to one network it is a path like that.
+#[test]
+fn the_direct_link_is_an_alarm_of_its_own() {
+    let linked = |networks: u32| {
+        let text = format!(
+            "[cluster]\nname = \"linked\"\nnetworks = {networks}\n\
+             [[controller]]\nname = \"pump\"\nladder = \"pump.ladder\"\n\
+             [[remote_io]]\nname = \"io\"\ncontroller = \"pump\"\n\
+             twin = {{ name = \"io-2\", wiring = \"exclusive\", direct_link = true }}\n"
+        );
+        let ladder = "program pump\ninput full\noutput run\nrung \"run\"\n  /full ( run )\n";
+        let mut open = |_: &str| Ok(ladder.to_owned());
+        understudy_cluster::read("cluster.toml", &text, &mut open).cluster.expect("right")
+    };
+    let (io, twin) = (Member::RemoteIo(ProgramId(0)), Member::Twin(ProgramId(0)));
+    for networks in [1, 2] {
+        let model = Model::new(Arc::new(linked(networks)), Bounds::default());
+        let mut told = Told { model, at_ns: 1 };
+        let shown = |told: &Told| {
+            let snapshot = told.model.snapshot();
+            let failed = snapshot.networks.iter().filter(|network| !network.in_order);
+            let failed: Vec<String> = failed.map(|network| network.name.clone()).collect();
+            (snapshot.networks.len(), failed, snapshot.networks_text())
+        };
+        let receives = |network, lost: &[Member]| {
+            let lost = lost.to_vec();
+            HostEvent::NetworkReception { network, lost, impaired: Vec::new() }
+        };
+        let paths = networks as usize + 1;
+        let quiet = (networks == 2).then(|| "either network may fail".to_owned());
+        assert_eq!(shown(&told), (paths, Vec::new(), quiet.clone()));
+        told.host(io, receives(Via::Link, &[twin]));
+        let text = "over the direct link no frames arrive from io-2 to io";
+        let expected = quiet.iter().map(String::as_str).chain([text]).collect::<Vec<_>>();
+        let failed = vec!["direct link".to_owned()];
+        assert_eq!(shown(&told), (paths, failed, Some(expected.join("; "))));
+        assert_eq!(told.lasting(0), [text]);
+        told.host(io, receives(Via::Link, &[]));
+        assert_eq!(shown(&told), (paths, Vec::new(), quiet));
+        told.host(twin, receives(Via::First, &[io]));
+        let (_, failed, text) = shown(&told);
+        assert_eq!(failed, ["network 1"]);
+        let left = if networks == 2 { "all depends on network 2: " } else { "" };
+        let expected = format!("{left}over network 1 no frames arrive from io to io-2");
+        assert_eq!(text, Some(expected));
+    }
 }
 
 /// One network that is open again says nothing of the other one.

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
-use understudy_wire::ZENOH_PORT_OFFSET;
+use understudy_wire::{Via, ZENOH_PORT_OFFSET};
 
 use super::Member;
 use crate::address::Addresses;
@@ -21,8 +21,8 @@ pub(crate) struct Names {
     has_multicast: bool,
     /// Nothing where their number is an error, which was reported.
     networks: Option<u32>,
-    /// By host, which network it is on and where that stands; hosts of loopback are on both.
-    hosts: BTreeMap<IpAddr, (bool, Range<usize>)>,
+    /// By host, which path it is on, and where in the file; hosts of loopback are on all.
+    hosts: BTreeMap<IpAddr, (Via, Range<usize>)>,
 }
 
 impl Names {
@@ -85,36 +85,48 @@ impl Names {
             ),
             _ => {}
         }
-        for (address, is_second) in [(&addresses.first, false), (&addresses.second, true)] {
-            if let Some(address) = address {
+        for via in Via::ALL {
+            if let Some(address) = addresses.as_ref().at(via) {
                 self.listen_at(address, diagnostics);
-                self.place_host(address, is_second, diagnostics);
+                self.place_host(address, via, diagnostics);
             }
         }
     }
 
-    /// Reports a host that is on both networks: what they share can take both away.
+    /// Reports a host that is on two paths: what they share can take both away.
     fn place_host(
         &mut self,
         Placed { value, span }: &Placed<SocketAddr>,
-        is_second: bool,
+        via: Via,
         diagnostics: &mut Vec<Diagnostic>,
     ) {
         let host = value.ip().to_canonical();
-        if self.networks != Some(2) || host.is_loopback() {
+        if host.is_loopback() {
             return;
         }
-        let (known, first) = self.hosts.entry(host).or_insert_with(|| (is_second, span.clone()));
-        if *known != is_second {
-            let message = format!("{host} is on the first and on the second network");
-            diagnostics.push(
-                Diagnostic::error("U0240", message, span.clone())
-                    .with_related(first.clone(), "the other network is here")
-                    .with_help(
-                        "each network needs an interface of its own, with an address of its own",
-                    ),
-            );
-        }
+        let (known, first) = self.hosts.entry(host).or_insert_with(|| (via, span.clone()));
+        let (code, message, related, help) = match (*known, via) {
+            (known, via) if known == via => return,
+            (Via::Link, network) | (network, Via::Link) => (
+                "U0263",
+                format!("{host} is on {network} and on the direct link"),
+                "the other path is here",
+                "the direct link needs an interface of its own, with an address of its own",
+            ),
+            // That the second one is too many was reported.
+            _ if self.networks != Some(2) => return,
+            _ => (
+                "U0240",
+                format!("{host} is on the first and on the second network"),
+                "the other network is here",
+                "each network needs an interface of its own, with an address of its own",
+            ),
+        };
+        diagnostics.push(
+            Diagnostic::error(code, message, span.clone())
+                .with_related(first.clone(), related)
+                .with_help(help),
+        );
     }
 
     /// Reports an address at which a member cannot listen: another member has it, or the link cannot use it.

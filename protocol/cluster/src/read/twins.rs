@@ -1,5 +1,6 @@
 //! The second remote I/O of a program.
 
+use std::net::SocketAddr;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -11,9 +12,10 @@ use understudy_typed::{Elementary, Points, is_within};
 
 use super::Member;
 use super::names::Names;
+use crate::address::Addresses;
 use crate::cluster::{PlantPlace, RemoteIo, Twin};
 use crate::device::{Connection, FieldDevice, SerialLine};
-use crate::fields::{ConnectionText, MAXIMUM_MISFITS};
+use crate::fields::{ConnectionText, MAXIMUM_MISFITS, Placed};
 use crate::file::{FieldSection, TwinSection};
 
 /// Periods after which a device is not written any more with outputs that were driven.
@@ -53,8 +55,60 @@ pub(super) fn read(
         paired_inputs,
         shared_outputs,
         field: device,
+        direct_link: section.direct_link,
         addresses: section.addresses.map(|address| address.value),
     })
+}
+
+/// Reports a direct link that does not join the two remote I/Os of a program. `first` are the addresses of the first one.
+pub(super) fn check_link(
+    first: &Addresses<Placed<SocketAddr>>,
+    twin: Option<&TwinSection>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let mut refuse = |message: String, place: &Placed<SocketAddr>, help: &str| {
+        let found = Diagnostic::error("U0263", message, place.span.clone());
+        diagnostics.push(found.with_help(help));
+    };
+    let own = twin.map(|twin| twin.addresses.as_ref());
+    let own_link = own.and_then(|own| own.link);
+    let given = first.link.as_ref().or(own_link);
+    match (twin, given) {
+        (None, Some(link)) => {
+            let message = "a `link_address` of a remote I/O without a twin".to_owned();
+            refuse(message, link, "add `twin`, or remove `link_address`");
+        }
+        (Some(twin), Some(link)) if !twin.direct_link => {
+            let message = "a `link_address` without `direct_link = true`".to_owned();
+            let help =
+                "add `direct_link = true` to the twin, and a `link_address` to both remote I/Os";
+            refuse(message, link, help);
+        }
+        (Some(twin), _) if twin.direct_link => {
+            let addresses = [first.as_ref(), twin.addresses.as_ref()];
+            for Addresses { first, link, .. } in addresses {
+                let help =
+                    "both remote I/Os have an `address` and a `link_address`, or neither has one";
+                match (first, link) {
+                    (Some(first), None) => {
+                        let at = first.value;
+                        let message = format!(
+                            "the remote I/O at {at} has a direct link and no `link_address`"
+                        );
+                        refuse(message, first, help);
+                    }
+                    (None, Some(link)) => {
+                        let at = link.value;
+                        let message =
+                            format!("the remote I/O at {at} has a `link_address` and no `address`");
+                        refuse(message, link, help);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        _ => {}
+    }
 }
 
 /// Warns of two remote I/Os of a program on one machine.

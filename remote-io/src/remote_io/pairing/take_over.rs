@@ -28,7 +28,9 @@ impl RemoteIo {
         let moment = self.member.moment();
         let is_idle = matches!(self.deadline, Deadline::Passed { idle: 1.. });
         pairing.receives_stations = !is_idle && pairing.reports.iter().any(Report::is_received);
-        let is_followed = pairing.followed.is_some_and(|(followed, _)| followed == moment);
+        // Without a cycle no station has followed anything since.
+        let followed = pairing.followed.filter(|_| !is_idle);
+        let is_followed = followed.is_some_and(|(followed, _)| followed == moment);
         pairing.idle = match pairing.part {
             Part::TakingOver | Part::Author if !is_followed => pairing.idle.saturating_add(1),
             _ => 0,
@@ -53,7 +55,8 @@ impl RemoteIo {
         self.send_pair();
     }
 
-    /// The outputs are given to the other one where the field device of this one does not answer, or no station follows it.
+    /// The outputs are given to the other one where the field device of this one does not answer, or no station follows it; at once where this one receives
+    /// no station and the other one does, which a direct link tells.
     fn hand_over(&mut self, now: Time, is_idle: bool) {
         let can_take_over = |pairing: &Pairing| {
             let reported =
@@ -61,7 +64,11 @@ impl RemoteIo {
             reported.is_some() && self.is_promised(pairing)
         };
         let has_partner = self.pairing.as_ref().is_some_and(can_take_over);
-        if !is_idle || !has_partner || self.question.is_some() {
+        let is_cut_off = |pairing: &Pairing| {
+            !pairing.receives_stations && pairing.idle > pairing.settings.take_over_after
+        };
+        let is_cut_off = self.pairing.as_ref().is_some_and(is_cut_off);
+        if !(is_idle || is_cut_off) || !has_partner || self.question.is_some() {
             return;
         }
         if let Some(pairing) = &mut self.pairing {

@@ -1,4 +1,4 @@
-//! Whether two networks are two: interfaces, subnets, cards and switches of their own.
+//! Whether two networks, and the direct link to the other remote I/O, are apart: interfaces, subnets, cards and switches of their own.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 use nix::ifaddrs::getifaddrs;
+use understudy_wire::Via;
 
 use super::{Finding, Health};
 use crate::endpoints::Endpoints;
@@ -25,62 +26,70 @@ struct Interface {
     switch: Option<String>,
 }
 
-/// Whether the two networks of a member fail apart; nothing in a cluster with one network.
+/// Whether the paths of a member fail apart, each two of them; nothing for a member on one network.
 pub fn examine_networks(endpoints: &Endpoints) -> Vec<Finding> {
-    let own = endpoints.own();
-    let Some(second) = own.second else {
-        return Vec::new();
-    };
-    if own.address.ip().is_loopback() && second.ip().is_loopback() {
+    let paths: Vec<(Via, IpAddr)> =
+        endpoints.own().paths().map(|(via, address)| (via, address.ip())).collect();
+    if paths.len() > 1 && paths.iter().all(|(_, host)| host.is_loopback()) {
+        let names: Vec<String> = paths.iter().map(|(via, _)| via.to_string()).collect();
         return vec![Finding::trouble(
             "networks",
             Health::Warning,
-            "both networks are the loopback interface of this machine",
-            "for a plant, an address of an interface of its own for each network",
+            format!("{} are the loopback interface of this machine", names.join(" and ")),
+            "for a plant, an address of an interface of its own for each",
         )];
     }
     let switches = switches();
-    let found = [own.address.ip(), second.ip()].map(|address| interface(address, &switches));
-    match found {
-        [Some(first), Some(second)] => compare(&first, &second),
-        // What is lacking is said of the ports.
-        _ => Vec::new(),
-    }
+    // What is lacking is said of the ports.
+    let there = |(via, host)| Some((via, interface(host, &switches)?));
+    examine(&paths.into_iter().filter_map(there).collect::<Vec<(Via, Interface)>>())
 }
 
-fn compare(first: &Interface, second: &Interface) -> Vec<Finding> {
+fn examine(found: &[(Via, Interface)]) -> Vec<Finding> {
+    let down = found.iter().filter(|(_, interface)| interface.is_down).map(|(via, interface)| {
+        let found = format!("{via} is down at {}", interface.name);
+        let remedy =
+            if *via == Via::Link { "check the cable" } else { "check the cable and the switch" };
+        Finding::trouble("networks", Health::Bad, found, remedy)
+    });
+    let rest = |place: usize| found.get(place + 1..).into_iter().flatten();
+    let pairs =
+        found.iter().enumerate().flat_map(|(place, one)| rest(place).map(move |it| (one, it)));
+    down.chain(pairs.flat_map(|(first, second)| compare(first, second))).collect()
+}
+
+fn compare((one, first): &(Via, Interface), (other, second): &(Via, Interface)) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut bad = |found: String, remedy: &str| {
         findings.push(Finding::trouble("networks", Health::Bad, found, remedy));
     };
-    for (number, interface) in [(1, first), (2, second)] {
-        if interface.is_down {
-            let found = format!("network {number} is down at {}", interface.name);
-            bad(found, "check the cable and the switch");
-        }
-    }
+    let is_link = *other == Via::Link;
     let shared = first.cards.intersection(&second.cards).next();
     if first.name == second.name {
         let found =
-            format!("both networks are at {}: one card or cable takes both away", first.name);
-        bad(found, "give each network an interface of its own");
+            format!("{one} and {other} are at {}: one card or cable takes both away", first.name);
+        bad(found, "give each an interface of its own");
     } else if let Some(card) = shared {
         let found = format!(
-            "{} and {} are on one card, {card}: it takes both networks away",
+            "{} and {} are on one card, {card}: it takes {one} and {other} away",
             first.name, second.name
         );
-        bad(found, "give each network a card of its own");
+        bad(found, "give each a card of its own");
     }
     if let Some(subnet) = first.subnet.filter(|_| first.subnet == second.subnet) {
         let found = format!(
-            "both networks are in the subnet of {subnet}: all frames leave over one interface"
+            "{one} and {other} are in the subnet of {subnet}: all frames leave over one interface"
         );
-        bad(found, "give each network a subnet of its own");
+        bad(found, "give each a subnet of its own");
     }
     if let Some(switch) = first.switch.as_ref().filter(|_| first.switch == second.switch) {
         let found =
             format!("{} and {} are connected to one switch, {switch}", first.name, second.name);
-        bad(found, "give each network a switch of its own, with a power supply of its own");
+        let remedy = match is_link {
+            true => "join the two remote I/Os by a cable, without a switch",
+            false => "give each network a switch of its own, with a power supply of its own",
+        };
+        bad(found, remedy);
     }
     if first.mtu != second.mtu
         && let (Some(one), Some(other)) = (first.mtu, second.mtu)
@@ -92,7 +101,7 @@ fn compare(first: &Interface, second: &Interface) -> Vec<Finding> {
                 "frames of up to {one} bytes pass {}, and of up to {other} bytes {}",
                 first.name, second.name
             ),
-            "the same MTU on both networks",
+            "the same MTU on both",
         ));
     }
     if !findings.is_empty() {
@@ -102,9 +111,11 @@ fn compare(first: &Interface, second: &Interface) -> Vec<Finding> {
         Some(switch) => format!("{} at switch {switch}", interface.name),
         None => interface.name.clone(),
     };
-    let found = format!("network 1 is {}, network 2 is {}", of(first), of(second));
+    let found = format!("{one} is {}, {other} is {}", of(first), of(second));
     vec![match (&first.switch, &second.switch) {
         (Some(_), Some(_)) => Finding::good("networks", found),
+        // A cable has no switch.
+        _ if is_link => Finding::good("networks", found),
         _ => Finding::trouble(
             "networks",
             Health::Warning,
@@ -194,7 +205,12 @@ mod tests {
     }
 
     fn check(first: &Interface, second: &Interface, expected: &[(Health, &str)]) {
-        let found = compare(first, second);
+        check_all(&[(Via::First, first), (Via::Second, second)], expected);
+    }
+
+    fn check_all(paths: &[(Via, &Interface)], expected: &[(Health, &str)]) {
+        let of = |(via, interface): &(Via, &Interface)| (*via, (*interface).clone());
+        let found = examine(&paths.iter().map(of).collect::<Vec<_>>());
         let found = found.iter().map(|finding| (finding.health, finding.found.as_str()));
         assert_eq!(found.collect::<Vec<_>>(), expected);
     }
@@ -209,10 +225,10 @@ mod tests {
         let one_switch = "eth0 and eth1 are connected to one switch, north";
         check(&first, &at("eth1", 2, Some("north")), &[(Health::Bad, one_switch)]);
         let same = [
-            (Health::Bad, "both networks are at eth0: one card or cable takes both away"),
+            (Health::Bad, "network 1 and network 2 are at eth0: one card or cable takes both away"),
             (
                 Health::Bad,
-                "both networks are in the subnet of 10.0.1.0: all frames leave over one interface",
+                "network 1 and network 2 are in the subnet of 10.0.1.0: all frames leave over one interface",
             ),
         ];
         check(&at("eth0", 1, None), &at("eth0", 1, None), &same);
@@ -221,7 +237,8 @@ mod tests {
             Interface { cards: card.clone(), ..at("eth0.1", 1, None) },
             Interface { cards: card, ..at("eth0.2", 2, None) },
         );
-        let one_card = "eth0.1 and eth0.2 are on one card, eth0: it takes both networks away";
+        let one_card =
+            "eth0.1 and eth0.2 are on one card, eth0: it takes network 1 and network 2 away";
         check(&one, &other, &[(Health::Bad, one_card)]);
         let down = Interface { is_down: true, mtu: Some(9000), ..second };
         let both = [
@@ -229,6 +246,34 @@ mod tests {
             (Health::Warning, "frames of up to 1500 bytes pass eth0, and of up to 9000 bytes eth1"),
         ];
         check(&first, &down, &both);
+    }
+
+    #[test]
+    fn a_direct_link_is_no_part_of_a_network() {
+        let (first, second) = (at("eth0", 1, Some("north")), at("eth1", 2, Some("south")));
+        let of_both = "network 1 is eth0 at switch north, network 2 is eth1 at switch south";
+        let good = [
+            (Health::Good, of_both),
+            (Health::Good, "network 1 is eth0 at switch north, the direct link is eth2"),
+            (Health::Good, "network 2 is eth1 at switch south, the direct link is eth2"),
+        ];
+        let link = at("eth2", 3, None);
+        check_all(&[(Via::First, &first), (Via::Second, &second), (Via::Link, &link)], &good);
+        let bad = [
+            (
+                Health::Bad,
+                "network 1 and the direct link are at eth0: one card or cable takes both away",
+            ),
+            (
+                Health::Bad,
+                "network 1 and the direct link are in the subnet of 10.0.1.0: all frames leave over one interface",
+            ),
+        ];
+        let link = at("eth0", 1, None);
+        check_all(&[(Via::First, &at("eth0", 1, None)), (Via::Link, &link)], &bad);
+        let bad = "eth0 and eth2 are connected to one switch, north";
+        let link = at("eth2", 3, Some("north"));
+        check_all(&[(Via::First, &first), (Via::Link, &link)], &[(Health::Bad, bad)]);
     }
 
     #[test]

@@ -17,6 +17,33 @@ const LEASE_MS: u32 = 2_000;
 /// A longer frame goes in parts. What waits for a peer takes eight batches of this size, at most.
 const BATCH_BYTES: u16 = 16 * 1024;
 
+/// The variable of the environment that sets up Zenoh's own threads.
+const RUNTIME: &str = "ZENOH_RUNTIME";
+
+/// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
+/// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do. Over several paths there are as
+/// many of each, so that what waits in the session of a network that has failed does not hold up the others.
+pub fn zenoh_runtime(paths: usize) -> (&'static str, &'static str) {
+    let threads = match paths {
+        0 | 1 => {
+            "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 1))"
+        }
+        2 => {
+            "(rx: (worker_threads: 2), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 2))"
+        }
+        _ => {
+            "(rx: (worker_threads: 3), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 3))"
+        }
+    };
+    (RUNTIME, threads)
+}
+
+/// The same for a process that only follows members, such as a spare: one thread for everything, since each packet wakes every thread that handles it.
+pub fn zenoh_runtime_of_follower() -> (&'static str, &'static str) {
+    let threads = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), app: (handover: net), net: (worker_threads: 1))";
+    (RUNTIME, threads)
+}
+
 /// The first hexadecimal digits of the identity of a member's sessions. The rest is random, so that a second life is never taken for the
 /// first.
 pub(super) fn identity(cluster: ClusterHash, member: Member) -> String {

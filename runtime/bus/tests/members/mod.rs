@@ -176,6 +176,7 @@ pub(crate) fn peers(members: &[Member]) -> Vec<Peer> {
             name: format!("{member:?}"),
             address,
             second: None,
+            link: None,
         })
         .collect()
 }

@@ -1,4 +1,5 @@
-//! A link over two independent networks: everything is sent over both.
+//! A link over several paths: two independent networks, or a network and the direct link to the other remote I/O of a program. A frame is sent over
+//! each path that its receivers are on.
 //!
 //! Which copy counts is decided where the frames are opened ([`crate::network_reception`]); nothing is dropped here.
 
@@ -17,22 +18,23 @@ use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 
-/// How long after an attempt a network that is not there is tried again.
+/// How long after an attempt a path that is not there is tried again.
 const TRY_AGAIN_AFTER: Duration = Duration::from_secs(1);
 
-pub(crate) struct TwoNetworks {
+pub(crate) struct Paths {
     address: SocketAddr,
-    links: [Option<Box<dyn Link>>; 2],
-    is_plugged: [bool; 2],
-    /// The network that is asked first next time, so that a flood on one of them does not hide the other.
-    next: Via,
+    /// By index of the path.
+    links: [Option<Box<dyn Link>>; Via::ALL.len()],
+    is_plugged: [bool; Via::ALL.len()],
+    /// Index of the path that is asked first next time, so that a flood on one of them does not hide the others.
+    next: usize,
     /// Readable when one of the links is, or when one has been opened.
     readiness: Epoll,
-    awaited: Option<Awaited>,
+    awaited: Vec<Awaited>,
     reopenings: Vec<Reopening>,
 }
 
-/// A network whose interface was not there at the start: a thread of its own tries again.
+/// A path whose interface was not there at the start: a thread of its own tries again.
 struct Awaited {
     via: Via,
     opened: Receiver<Box<dyn Link>>,
@@ -45,7 +47,7 @@ struct Awaited {
 impl Awaited {
     fn start(via: Via, kind: LinkKind, endpoints: Endpoints) -> Result<Self, BusError> {
         let bell = EventFd::from_flags(EfdFlags::EFD_CLOEXEC | EfdFlags::EFD_NONBLOCK)
-            .map_err(BusError::system("an eventfd for the other network"))?;
+            .map_err(BusError::system("an eventfd for another network"))?;
         let bell = Arc::new(bell);
         let (opens, opened) = channel();
         let (stop, stopped) = channel::<()>();
@@ -60,80 +62,75 @@ impl Awaited {
                 }
             }
         };
-        std::thread::Builder::new().name("other-network".into()).spawn(attempts).map_err(
-            |source| BusError::System { what: "a thread for the other network", source },
-        )?;
+        std::thread::Builder::new()
+            .name("other-network".into())
+            .spawn(attempts)
+            .map_err(|source| BusError::System { what: "a thread for another network", source })?;
         Ok(Self { via, opened, bell, _stop: stop })
     }
 }
 
-impl TwoNetworks {
-    /// Opens both links, or one of them where the other's interface is not there: it is opened when it is.
-    pub(crate) fn open(
-        kind: LinkKind,
-        first: &Endpoints,
-        second: &Endpoints,
-    ) -> Result<Self, BusError> {
-        let (mut awaited, mut reopenings) = (None, Vec::new());
-        let links = match (kind.open_one(first), kind.open_one(second)) {
-            (Ok(first), Ok(second)) => [Some(first), Some(second)],
-            (Ok(link), Err(error)) if is_absent(&error) => {
-                reopenings.push(failed(Via::Second, &error));
-                awaited = Some(Awaited::start(Via::Second, kind, second.clone())?);
-                [Some(link), None]
-            }
-            (Err(error), Ok(link)) if is_absent(&error) => {
-                reopenings.push(failed(Via::First, &error));
-                awaited = Some(Awaited::start(Via::First, kind, first.clone())?);
-                [None, Some(link)]
-            }
-            (Err(error), _) | (_, Err(error)) => return Err(error),
+impl Paths {
+    /// Opens the links, or some of them where the interfaces of the others are not there: each of these is opened when it is.
+    pub(crate) fn open(kind: LinkKind, paths: Vec<(Via, Endpoints)>) -> Result<Self, BusError> {
+        let failed = "to wait for several networks at once";
+        let readiness =
+            Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(BusError::system(failed))?;
+        let Some(address) = paths.first().map(|(_, endpoints)| endpoints.own().address) else {
+            return Err(BusError::System { what: failed, source: io::ErrorKind::NotFound.into() });
         };
-        let readiness = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC);
-        let readiness = readiness.map_err(BusError::system("to wait for two networks at once"))?;
-        let opened = Self {
-            address: first.own().address,
-            links,
-            is_plugged: [true; 2],
-            next: Via::First,
+        let mut opened = Self {
+            address,
+            links: [const { None }; Via::ALL.len()],
+            is_plugged: [true; Via::ALL.len()],
+            next: 0,
             readiness,
-            awaited,
-            reopenings,
+            awaited: Vec::new(),
+            reopenings: Vec::new(),
         };
-        for link in opened.links.iter().flatten() {
-            opened.watch(link.readiness())?;
+        let mut absent = Vec::new();
+        for (via, endpoints) in paths {
+            match kind.open_one(&endpoints) {
+                Ok(link) => {
+                    opened.watch(link.readiness())?;
+                    opened.links[via.index()] = Some(link);
+                }
+                Err(error) if is_absent(&error) => absent.push((via, endpoints, error)),
+                Err(error) => return Err(error),
+            }
         }
-        if let Some(awaited) = &opened.awaited {
+        if opened.links.iter().all(Option::is_none)
+            && let Some((.., error)) = absent.pop()
+        {
+            return Err(error);
+        }
+        for (via, endpoints, error) in absent {
+            let failure = Some(error.to_string());
+            opened.reopenings.push(changed(via, failure));
+            let awaited = Awaited::start(via, kind, endpoints)?;
             opened.watch(awaited.bell.as_fd())?;
+            opened.awaited.push(awaited);
         }
         Ok(opened)
     }
 
     fn watch(&self, descriptor: BorrowedFd<'_>) -> Result<(), BusError> {
         let added = self.readiness.add(descriptor, EpollEvent::new(EpollFlags::EPOLLIN, 0));
-        added.map_err(BusError::system("to wait for two networks at once"))
+        added.map_err(BusError::system("to wait for several networks at once"))
     }
 
-    /// Takes the link of a network that has come.
+    /// Takes the links of paths that have come.
     fn welcome(&mut self) {
-        let Some(awaited) = &self.awaited else {
-            return;
-        };
-        let Ok(link) = awaited.opened.try_recv() else {
-            return;
-        };
-        let via = awaited.via;
-        let watched = self.watch(link.readiness());
-        let failure = watched.err().map(|error| error.to_string());
-        self.reopenings.push(Reopening {
-            via: Some(via),
-            silence: Duration::ZERO,
-            peer: None,
-            failure,
-        });
-        self.links[via.index()] = Some(link);
-        // Its bell is closed with it, and so leaves the epoll.
-        self.awaited = None;
+        let opened = |awaited: &Awaited| Some((awaited.via, awaited.opened.try_recv().ok()?));
+        while let Some((place, (via, link))) =
+            self.awaited.iter().enumerate().find_map(|(place, it)| Some((place, opened(it)?)))
+        {
+            let watched = self.watch(link.readiness());
+            self.reopenings.push(changed(via, watched.err().map(|error| error.to_string())));
+            self.links[via.index()] = Some(link);
+            // Its bell is closed with it, and so leaves the epoll.
+            self.awaited.remove(place);
+        }
     }
 }
 
@@ -142,12 +139,12 @@ fn is_absent(error: &BusError) -> bool {
     matches!(error, BusError::Listen { source, .. } if source.kind() == io::ErrorKind::AddrNotAvailable)
 }
 
-fn failed(via: Via, error: &BusError) -> Reopening {
-    let failure = Some(error.to_string());
+/// A path has been opened, or could not be.
+fn changed(via: Via, failure: Option<String>) -> Reopening {
     Reopening { via: Some(via), silence: Duration::ZERO, peer: None, failure }
 }
 
-impl Link for TwoNetworks {
+impl Link for Paths {
     fn address(&self) -> SocketAddr {
         self.address
     }
@@ -164,14 +161,16 @@ impl Link for TwoNetworks {
 
     fn receive(&mut self, bytes: &mut Vec<u8>) -> Option<Via> {
         self.welcome();
-        for via in [self.next, self.next.other()] {
-            let Some(link) = &mut self.links[via.index()] else {
+        let first = self.next;
+        for offset in 0..Via::ALL.len() {
+            let place = (first + offset) % Via::ALL.len();
+            let Some(link) = &mut self.links[place] else {
                 continue;
             };
             while link.receive(bytes).is_some() {
-                if self.is_plugged[via.index()] {
-                    self.next = via.other();
-                    return Some(via);
+                if self.is_plugged[place] {
+                    self.next = (place + 1) % Via::ALL.len();
+                    return Some(Via::ALL[place]);
                 }
             }
         }
@@ -199,7 +198,7 @@ impl Link for TwoNetworks {
         if let Some(reopening) = self.reopenings.pop() {
             return Some(reopening);
         }
-        Via::BOTH.into_iter().find_map(|via| {
+        Via::ALL.into_iter().find_map(|via| {
             let reopening = self.links[via.index()].as_mut()?.reopening()?;
             Some(Reopening { via: Some(via), ..reopening })
         })

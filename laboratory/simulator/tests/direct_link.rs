@@ -1,0 +1,201 @@
+//! A cable between the two remote I/Os of each program, apart from the networks: what it masks, and that it harms nothing.
+
+mod press_cell;
+
+use std::time::Duration;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use understudy_cycle::Mode;
+use understudy_remote_io::Event;
+use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId, Time, Via};
+
+const ROBOT: ProgramId = ProgramId(0);
+const FIRST: Member = Member::RemoteIo(ROBOT);
+const TWIN: Member = Member::Twin(ROBOT);
+
+type Wire = fn(&mut Parts, u32);
+const WIRINGS: [Wire; 2] = [press_cell::pair, press_cell::pair_parallel];
+
+fn parts(wire: Wire, take_over_after: u32, is_linked: bool) -> Parts {
+    let mut parts = press_cell::parts(Mode::Full, 1);
+    wire(&mut parts, take_over_after);
+    parts.has_two_networks = true;
+    parts.direct_links = if is_linked { ProgramSet::first(2) } else { ProgramSet::EMPTY };
+    parts
+}
+
+fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
+    Fault { at_cycle, phase, member, action }
+}
+
+/// Both networks fail between the two remote I/Os of the robot.
+fn cut_between(at_cycle: u64, phase: f64) -> Vec<Fault> {
+    vec![
+        fault(at_cycle, phase, FIRST, Action::Cut { to: TWIN }),
+        fault(at_cycle, phase, TWIN, Action::Cut { to: FIRST }),
+    ]
+}
+
+/// What came of a run.
+struct Outcome {
+    simulation: Simulation,
+    /// Periods in which the outputs of the robot were not driven, in a row, and deadlines at which nothing was proved.
+    held: u64,
+    /// The cycles in which the two remote I/Os did not receive each other any more, as they report.
+    partner_lost: Vec<u64>,
+}
+
+fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
+    let mut simulation = Simulation::new(parts, Network::default(), 1);
+    for fault in faults {
+        simulation.schedule(*fault);
+    }
+    let (mut last, mut longest) = (None::<Time>, Duration::ZERO);
+    let mut partner_lost = Vec::new();
+    let mut observe = |now: Time, cycle: Option<u64>, member: Member, record: Record<'_>| match (
+        cycle, member, record,
+    ) {
+        (Some(_), Member::Plant(ROBOT), Record::Plant(..)) => {
+            longest = longest.max(now.since(last.replace(now).unwrap_or(now)));
+        }
+        (Some(cycle), FIRST | TWIN, Record::RemoteIo(Event::PartnerLost { .. })) => {
+            partner_lost.push(cycle);
+        }
+        _ => {}
+    };
+    simulation.run(0, 200, &mut observe).expect("the cluster gets ready");
+    simulation.go_to(cycles, 0.0, &mut observe);
+    assert_eq!(simulation.violations(), []);
+    let end = last.map_or(Duration::MAX, |last| simulation.now().since(last));
+    let longest = longest.max(end.saturating_sub(press_cell::PERIOD));
+    let gap = (longest.as_secs_f64() / press_cell::PERIOD.as_secs_f64()).round() as u64 - 1;
+    let tally = &simulation.tallies()[ROBOT.index()];
+    let held = gap + tally.held + tally.fail_safe;
+    Outcome { simulation, held, partner_lost }
+}
+
+/// Over the link the two receive each other while the networks between them are cut; without it each reports that it does not.
+#[test]
+fn the_two_receive_each_other_while_the_networks_between_them_are_cut() {
+    for wire in WIRINGS {
+        for tenth in 0..10 {
+            let faults = cut_between(100, f64::from(tenth) / 10.0);
+            for is_linked in [false, true] {
+                let outcome = run(parts(wire, 1, is_linked), &faults, 300);
+                assert_eq!(outcome.held, 0, "{is_linked} {tenth}");
+                assert_eq!(outcome.simulation.author(ROBOT), Some(FIRST));
+                assert_eq!(outcome.partner_lost.is_empty(), is_linked, "{is_linked} {tenth}");
+            }
+        }
+    }
+}
+
+/// The networks between the two are cut, then a controller ends, then the author. Over the link the follower knows from the author that nothing is lost with
+/// the controller, and takes over as if the networks were in order; without it an operator must decide.
+#[test]
+fn a_follower_on_the_link_takes_over_after_a_cut() {
+    for wire in WIRINGS {
+        for after in 1..=3 {
+            for tenth in 0..10 {
+                let phase = f64::from(tenth) / 10.0;
+                let mut faults = cut_between(100, phase);
+                faults.push(fault(150, phase, Member::Station(StationId(0)), Action::Crash));
+                faults.push(fault(200, phase, FIRST, Action::Crash));
+                let linked = run(parts(wire, after, true), &faults, 400);
+                assert_eq!(linked.simulation.author(ROBOT), Some(TWIN), "{after} {phase}");
+                assert!(linked.held <= u64::from(after) + 1, "{after} {phase}: {}", linked.held);
+                let unlinked = run(parts(wire, after, false), &faults, 400);
+                assert_eq!(unlinked.simulation.author(ROBOT), None, "{after} {phase}");
+                assert!(unlinked.simulation.asking().contains(ROBOT), "{after} {phase}");
+            }
+        }
+    }
+}
+
+/// The author loses all stations, and the follower still receives it: over the link, where the cables to both networks are pulled, or over the networks. The
+/// author gives the outputs to the follower.
+#[test]
+fn an_author_without_stations_gives_the_outputs_to_the_follower() {
+    for wire in WIRINGS {
+        for after in 1..=3 {
+            for tenth in 0..10 {
+                let phase = f64::from(tenth) / 10.0;
+                let pulled = Via::NETWORKS
+                    .map(|network| fault(100, phase, FIRST, Action::Unplug { network }))
+                    .to_vec();
+                let cut = (0..3).map(|rank| Member::Station(StationId(rank))).flat_map(|station| {
+                    let forth = fault(100, phase, FIRST, Action::Cut { to: station });
+                    [forth, fault(100, phase, station, Action::Cut { to: FIRST })]
+                });
+                for (is_linked, faults) in [(true, pulled), (false, cut.collect())] {
+                    let outcome = run(parts(wire, after, is_linked), &faults, 300);
+                    let what = format!("{after} {phase} {is_linked}: {}", outcome.held);
+                    assert_eq!(outcome.simulation.author(ROBOT), Some(TWIN), "{what}");
+                    assert!(outcome.held <= u64::from(2 * after) + 1, "{what}");
+                }
+            }
+        }
+    }
+}
+
+/// The link fails and comes back: no cycle is lost.
+#[test]
+fn a_link_that_fails_costs_no_cycle() {
+    let network = Via::Link;
+    for wire in WIRINGS {
+        for member in [FIRST, TWIN] {
+            let faults = [
+                fault(100, 0.3, member, Action::Unplug { network }),
+                fault(200, 0.6, member, Action::Plug { network }),
+            ];
+            let outcome = run(parts(wire, 1, true), &faults, 300);
+            assert_eq!((outcome.held, outcome.partner_lost.len()), (0, 0));
+            assert_eq!(outcome.simulation.author(ROBOT), Some(FIRST));
+        }
+    }
+    // Pulled, it carries nothing.
+    for member in [FIRST, TWIN] {
+        let mut faults = cut_between(100, 0.3);
+        faults.push(fault(100, 0.3, member, Action::Unplug { network }));
+        let outcome = run(parts(press_cell::pair, 1, true), &faults, 300);
+        assert_eq!(outcome.partner_lost.len(), 2);
+    }
+}
+
+/// Members fail, cables are pulled and networks are cut between members, by chance: nothing wrong is driven, and two never drive at one time.
+#[test]
+fn nothing_wrong_is_driven_whatever_fails() {
+    let mut random = Pcg64Mcg::seed_from_u64(36);
+    let members = [
+        Member::Station(StationId(0)),
+        Member::Station(StationId(1)),
+        Member::Station(StationId(2)),
+        FIRST,
+        TWIN,
+    ];
+    for number in 0..200 {
+        let wire = WIRINGS[number % 2];
+        let mut faults = Vec::new();
+        for _ in 0..4 {
+            let member = members[random.random_range(0..members.len())];
+            let (from, lasts) = (random.random_range(50..150), random.random_range(1..60));
+            let phase = f64::from(random.random_range(0..10)) / 10.0;
+            let to = members[random.random_range(0..members.len())];
+            let network = Via::ALL[random.random_range(0..3)];
+            let (begins, ends) = match random.random_range(0..4) {
+                0 => (Action::Crash, Action::Restart),
+                1 => (Action::Stop, Action::Continue),
+                2 if to != member => (Action::Cut { to }, Action::Heal { to }),
+                _ => (Action::Unplug { network }, Action::Plug { network }),
+            };
+            faults.push(fault(from, phase, member, begins));
+            faults.push(fault(from + lasts, phase, member, ends));
+        }
+        let mut parts = parts(wire, random.random_range(1..=3), true);
+        parts.has_two_networks = random.random();
+        let outcome = run(parts, &faults, 300);
+        assert_eq!(outcome.simulation.violations(), [], "{number}: {faults:?}");
+    }
+}
