@@ -252,9 +252,8 @@ impl Model {
         let stopped = missing == Some(Missing::ProgramFault);
         let failed = if stopped { history.fault_before(place) } else { None };
         let explained_by = self.version_at(history, failed.or(explained).unwrap_or(place))?;
-        let explained_by = explained_by.controller();
-        let code = &explained_by.code;
-        let because = match (explained_by.ladder(), code.source_text()) {
+        let code = &explained_by.controller().code;
+        let because = match (code.ladder(), explained_by.text()) {
             (Some(ladder), _) => explained
                 .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
                 .transpose()?,

@@ -51,13 +51,13 @@ impl<'m> Explainer<'m> {
         model: &'m Model,
         history: &'m History,
         program: &'m Program,
-        text: &'m str,
+        text: SourceText<'m>,
     ) -> Self {
         Self {
             model,
             history,
             program,
-            text: SourceText::new(text),
+            text,
             traces: HashMap::new(),
             count: 0,
             explained: HashSet::new(),
@@ -209,7 +209,7 @@ impl<'m> Explainer<'m> {
         let routine = self.program.routine(routine);
         if self.text.declares(&routine.name) {
             reason.line = Some(line).filter(|line| *line > 0);
-            reason.statement = self.text.line(line).map(str::to_owned);
+            reason.statement = self.text.statement(line, Some(&reason.signal)).map(str::to_owned);
         } else {
             reason.text += &format!(", in the library block {}", routine.name);
         }
@@ -314,7 +314,7 @@ impl<'m> Explainer<'m> {
                 self.written((&part.name, part.address, stored), trace, write, place, depth)
             }
             (Some(write), None) => {
-                let line = self.text.line(trace.done[write].line);
+                let line = self.text.statement(trace.done[write].line, None);
                 let target = line.and_then(|line| line.split_once(":="));
                 let name = target.map_or("temporary", |(target, _)| target.trim());
                 self.written((name, read.address, stored), trace, write, place, depth)
