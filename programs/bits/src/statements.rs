@@ -1,5 +1,8 @@
 //! The statement of a program in which a value is met, and the variable that it is of.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
 use understudy_typed::{Elementary, Place, Program, Root, Statement, StatementKind, Uses, bodies};
 
 use crate::exact::Gap;
@@ -7,14 +10,15 @@ use crate::exact::Gap;
 /// Values without bits, each with the variable that takes it and a statement: that which computes the value, else the first one that names the
 /// variable. Each variable is told once, in the order of the statements.
 pub(crate) fn told(gaps: Vec<Gap>, program: &Program) -> Vec<Gap> {
+    let instances = Instances::of(program);
     let mut told: Vec<Gap> = Vec::new();
     for mut gap in gaps {
         match &gap.at {
             Some((routine, line)) => {
-                let assigned = assigned(program, routine, *line).filter(|part| part.1 == gap.of);
+                let assigned = instances.assigned(routine, *line).filter(|part| part.1 == gap.of);
                 gap.what = assigned.map_or(gap.what, |(name, _)| name);
             }
-            None => gap.at = first_naming(program, &gap.what),
+            None => gap.at = instances.first_naming(&gap.what),
         }
         if told.iter().all(|known| known.what != gap.what) {
             told.push(gap);
@@ -24,44 +28,87 @@ pub(crate) fn told(gaps: Vec<Gap>, program: &Program) -> Vec<Gap> {
     told
 }
 
-/// The variable that the only assignment in a line of a routine writes, with its type.
-fn assigned(program: &Program, routine: &str, line: u32) -> Option<(String, Elementary)> {
-    let mut routines = program.routines.iter();
-    let found = routines.find(|found| found.name == routine)?;
-    let mut places = Vec::new();
-    each(&found.body, &mut |statement| match &statement.kind {
-        StatementKind::Assign(place, _) if statement.line == line => places.push(place),
-        _ => {}
-    });
-    let [place] = places.as_slice() else {
-        return None;
-    };
-    let part = program.part_at(address(place)?)?;
-    Some((part.name, place.of.elementary()?))
+/// The instances on which the routines of a program run.
+struct Instances<'p> {
+    program: &'p Program,
+    /// The first slot of each routine's only instance; nothing for one with several.
+    slots: HashMap<u32, Option<u32>>,
 }
 
-/// The first statement that names a variable: its routine and its line.
-fn first_naming(program: &Program, variable: &str) -> Option<(String, u32)> {
-    let at = program.part(variable)?.address;
-    program.routines.iter().find_map(|routine| {
-        let mut first = None;
-        each(&routine.body, &mut |statement| {
-            if first.is_none() && statement.line > 0 && names(statement, at) {
-                first = Some(statement.line);
+impl<'p> Instances<'p> {
+    fn of(program: &'p Program) -> Self {
+        let mut slots: HashMap<u32, Option<u32>> = HashMap::new();
+        let mut open: Vec<(u32, u32)> =
+            program.tasks.iter().map(|task| (task.routine.0, task.own)).collect();
+        while let Some((routine, own)) = open.pop() {
+            match slots.entry(routine) {
+                Entry::Occupied(mut known) => {
+                    if *known.get() != Some(own) {
+                        known.insert(None);
+                    }
+                    continue;
+                }
+                Entry::Vacant(free) => {
+                    free.insert(Some(own));
+                }
             }
-        });
-        Some((routine.name.clone(), first?))
-    })
-}
+            let body = program.routines.get(routine as usize).map_or(&[][..], |it| &it.body);
+            each(body, &mut |statement| {
+                if let StatementKind::Invoke(called, place) = &statement.kind
+                    && let Some(slot) = slot(place, Some(own))
+                {
+                    open.push((called.0, slot));
+                }
+            });
+        }
+        Self { program, slots }
+    }
 
-/// Whether a statement names the variable at an address, by itself and not by the statements within it.
-fn names(statement: &Statement, at: u64) -> bool {
-    let count = |statements: &[Statement]| {
-        let Uses { reads, writes } = Uses::of(statements);
-        reads.into_iter().chain(writes).filter(|place| address(place) == Some(at)).count()
-    };
-    let within: usize = bodies(statement).into_iter().map(count).sum();
-    count(std::slice::from_ref(statement)) > within
+    /// The address of a place in a routine.
+    fn address(&self, routine: usize, place: &Place) -> Option<u64> {
+        let own = self.slots.get(&u32::try_from(routine).ok()?).copied().flatten();
+        Some(64 * u64::from(slot(place, own)?) + u64::from(place.bit))
+    }
+
+    /// The variable that the only assignment in a line of a routine writes, with its type.
+    fn assigned(&self, routine: &str, line: u32) -> Option<(String, Elementary)> {
+        let found = self.program.routines.iter().position(|found| found.name == routine)?;
+        let mut places = Vec::new();
+        each(&self.program.routines[found].body, &mut |statement| match &statement.kind {
+            StatementKind::Assign(place, _) if statement.line == line => places.push(place),
+            _ => {}
+        });
+        let [place] = places.as_slice() else {
+            return None;
+        };
+        let part = self.program.part_at(self.address(found, place)?)?;
+        Some((part.name, place.of.elementary()?))
+    }
+
+    /// The first statement that names a variable: its routine and its line.
+    fn first_naming(&self, variable: &str) -> Option<(String, u32)> {
+        let at = self.program.part(variable)?.address;
+        self.program.routines.iter().enumerate().find_map(|(place, routine)| {
+            let mut first = None;
+            each(&routine.body, &mut |statement| {
+                if first.is_none() && statement.line > 0 && self.names(place, statement, at) {
+                    first = Some(statement.line);
+                }
+            });
+            Some((routine.name.clone(), first?))
+        })
+    }
+
+    /// Whether a statement names the variable at an address, by itself and not by the statements within it.
+    fn names(&self, routine: usize, statement: &Statement, at: u64) -> bool {
+        let count = |statements: &[Statement]| {
+            let Uses { reads, writes } = Uses::of(statements);
+            let mut places = reads.into_iter().chain(writes);
+            places.by_ref().filter(|place| self.address(routine, place) == Some(at)).count()
+        };
+        let within: usize = bodies(statement).into_iter().map(count).sum();
+        count(std::slice::from_ref(statement)) > within
+    }
 }
 
 /// Shows every statement, outer ones first.
@@ -74,12 +121,12 @@ fn each<'a>(statements: &'a [Statement], show: &mut dyn FnMut(&'a Statement)) {
     }
 }
 
-/// The address of a place of the state without computed indices.
-fn address(place: &Place) -> Option<u64> {
-    match place.root {
-        Root::Global(slot) if place.indices.is_empty() => {
-            Some(64 * (u64::from(slot) + u64::from(place.offset)) + u64::from(place.bit))
-        }
-        _ => None,
-    }
+/// The slot of a place without computed indices, in a routine on the instance at slot `own`.
+fn slot(place: &Place, own: Option<u32>) -> Option<u32> {
+    let root = match place.root {
+        Root::Global(slot) => slot,
+        Root::Own(slot) => own? + slot,
+        _ => return None,
+    };
+    place.indices.is_empty().then_some(root + place.offset)
 }
