@@ -134,10 +134,9 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         // A variable of a frame has no name but in the text.
         if let Effect::Assigned { address, value: Some((of, stored)), .. } = done.effect
             && address / 64 >= u64::from(typed.state)
-            && let Some((target, _)) =
-                source.statement(done.line, None).and_then(|it| it.split_once(":="))
+            && let Some(target) = source.assigned(done.line)
         {
-            let key = (routine.to_lowercase(), target.trim().to_lowercase());
+            let key = (routine.to_lowercase(), target.to_lowercase());
             temporary.insert(key, (of, stored));
         }
     }

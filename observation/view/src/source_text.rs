@@ -150,6 +150,14 @@ impl<'t> SourceText<'t> {
         self.line(self.shown_line(file_line, target)?)
     }
 
+    /// What the statement in a line of the file assigns, as it is written; nothing where several do.
+    pub(crate) fn assigned(&self, file_line: u32) -> Option<&'t str> {
+        let lines = self.listing.map_or(std::slice::from_ref(&file_line), |it| it.lines(file_line));
+        let mut targets = lines.iter().filter_map(|line| self.line(*line)?.split_once(":="));
+        let (target, _) = targets.next()?;
+        targets.next().is_none().then_some(target.trim())
+    }
+
     /// The line of the file with the statement that begins in a line of this text.
     pub(crate) fn file_line(&self, line: u32) -> Option<u32> {
         self.listing.map_or(Some(line), |listing| listing.file_line(line))

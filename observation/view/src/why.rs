@@ -293,7 +293,10 @@ impl Model {
             inputs_text: sampled
                 .next()
                 .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
-            of: text.and_then(|_| typed.part(name)?.declared()),
+            of: text.and_then(|_| match output {
+                Some(output) => Some(output.declared()),
+                None => typed.part(name)?.declared(),
+            }),
             ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: decided.and_then(|driven| self.reconstructed(program, step, driven)),

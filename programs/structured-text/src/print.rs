@@ -20,7 +20,7 @@ pub fn file(file: &File) -> String {
 pub struct Placed {
     /// The text.
     pub text: String,
-    /// Each statement, instruction and transition: where it stands in the text that was read, and its first byte in this one, in the order of this one.
+    /// Each statement, instruction, transition and action of a step: where it stands in the text that was read, and its first byte in this one, in the order of this one.
     pub places: Vec<(Span, usize)>,
 }
 
@@ -165,6 +165,7 @@ impl Printer {
                     for indicator in &association.indicators {
                         inner += &format!(", {indicator}");
                     }
+                    printer.place(&association.action.span());
                     printer.line(&format!("{}({inner});", association.action));
                 }
             });
