@@ -1,5 +1,5 @@
-//! A point is what its author declared, in each language and at each place that shows it: the same INT, DINT, TIME, enumeration, subrange, BOOL array
-//! and structure, written in text, as a chart and as an instruction list, and as documents of PLCopen with each of their bodies.
+//! A point is what its author declared, in each language and at each place that shows it: the same INT, DINT, TIME, LTIME, DATE, enumeration, subrange,
+//! BOOL array and structure, written in text, as a chart and as an instruction list, and as documents of PLCopen with each of their bodies.
 
 use std::fs;
 use std::path::Path;
@@ -32,10 +32,12 @@ const fn row(
     Row { name, of, scan, file, shown, wrong, safe }
 }
 
-const POINTS: [Row; 12] = [
+const POINTS: [Row; 14] = [
     row("n", "INT", ["20", "20", "20", "40000", "0"]),
     row("d", "DINT", ["-70000", "-70000", "-70000", "3000000000", "0"]),
     row("t", "TIME", ["T#1s500ms", "\"1.5s\"", "1s500ms", "1.5", "\"0ms\""]),
+    row("lt", "LTIME", ["LT#4us", "\"4us\"", "4us", "D#1970-01-01", "\"0ms\""]),
+    row("day", "DATE", ["D#2024-02-29", "\"2024-02-29\"", "2024-02-29", "T#1s", "\"1970-01-01\""]),
     row("m", "Mode", ["Auto", "\"Auto\"", "Auto", "Fast", "\"Off\""]),
     row("s", "INT (3..9)", ["5", "5", "5", "10", "3"]),
     row("bits[0]", "BOOL", ["1", "true", "1", "2", "false"]),
@@ -52,8 +54,8 @@ const DECLARED: &str = "TYPE
   Motor : STRUCT run : BOOL; speed : INT; wait : TIME; mode : Mode; END_STRUCT;
 END_TYPE
 PROGRAM one
-  VAR_INPUT n : INT; d : DINT; t : TIME; m : Mode; s : INT (3..9); bits : ARRAY [0..2] OF BOOL; mot : Motor; END_VAR
-  VAR_OUTPUT qn : INT; qd : DINT; qt : TIME; qm : Mode; qs : INT (3..9); qbits : ARRAY [0..2] OF BOOL; qmot : Motor; END_VAR
+  VAR_INPUT n : INT; d : DINT; t : TIME; lt : LTIME; day : DATE; m : Mode; s : INT (3..9); bits : ARRAY [0..2] OF BOOL; mot : Motor; END_VAR
+  VAR_OUTPUT qn : INT; qd : DINT; qt : TIME; qlt : LTIME; qday : DATE; qm : Mode; qs : INT (3..9); qbits : ARRAY [0..2] OF BOOL; qmot : Motor; END_VAR
 ";
 
 /// The program with its name in each language.
@@ -201,6 +203,8 @@ fn drafted(folder: &Path, program: &str) {
     for line in [
         "qs : INT (3..9);",
         "qt : TIME;",
+        "qlt : LTIME;",
+        "qday : DATE;",
         "qm : INT;  // Mode: Off = 0, Manual = 3, Auto = 7",
         "  // Auto, else Off",
     ] {
@@ -256,7 +260,8 @@ fn of_a_run(
     }
     run(folder, &["animate", "runs/latest", "--program", "one", "--from", "5", "--to", "30"]);
     let film = fs::read_to_string(folder.join("animation.svg")).expect("a picture");
-    for Row { name, of, shown, .. } in &POINTS {
+    assert!(film.contains("; 2 more outputs are not shown"), "{program}: {film}");
+    for Row { name, of, shown, .. } in &POINTS[..12] {
         assert!(film.contains(&format!(">q{name}</text>")), "{program}: {film}");
         assert!(*of == "BOOL" || film.contains(&format!(">{shown}</text>")), "{program}: {film}");
     }
@@ -265,6 +270,8 @@ fn of_a_run(
         ("one.qn ", "INT: output"),
         ("one.qd ", "DINT: output"),
         ("one.qt ", "TIME in nanoseconds: output"),
+        ("one.qlt ", "LTIME in nanoseconds: output"),
+        ("one.qday ", "DATE in nanoseconds: output"),
         ("one.qm ", "INT, 0 Off, 3 Manual, 7 Auto: output"),
         ("one.qs ", "INT (3..9): output"),
         ("one.qbits[2] ", "output"),

@@ -21,6 +21,8 @@ pub struct Point {
     pub range: Option<(i128, i128)>,
     /// The names of its values, where it is declared with an enumeration.
     pub values: Option<Arc<Enumeration>>,
+    /// It is declared with the long name of its type, such as LTIME.
+    pub is_long: bool,
     /// Its first bit in the image.
     pub bit: u32,
     /// Where it stands in the program's state, as a slot.
@@ -38,6 +40,8 @@ pub struct Declared {
     pub range: Option<(i128, i128)>,
     /// The names of the values of an enumeration.
     pub values: Option<Arc<Enumeration>>,
+    /// It is declared as LTIME, LDATE and the like, which have the values of TIME and DATE here.
+    pub is_long: bool,
 }
 
 impl Declared {
@@ -99,7 +103,12 @@ impl Declared {
 
     /// A stored value as a program writes it: `Auto`, and all else as [`Elementary::text`] has it.
     pub fn text(&self, stored: u64) -> String {
-        self.value_name(stored).map_or_else(|| self.of.text(stored), str::to_owned)
+        self.value_name(stored).map_or_else(|| self.long(self.of.text(stored)), str::to_owned)
+    }
+
+    /// The literal of a time in the form of its declaration: `LT#1s` of an LTIME.
+    pub(crate) fn long(&self, literal: String) -> String {
+        if self.is_long && literal.contains('#') { format!("L{literal}") } else { literal }
     }
 
     /// The name of a stored value of an enumeration; of several the first.
@@ -125,7 +134,7 @@ impl Declared {
 
 impl From<Elementary> for Declared {
     fn from(of: Elementary) -> Self {
-        Self { of, range: None, values: None }
+        Self { of, range: None, values: None, is_long: false }
     }
 }
 
@@ -138,6 +147,7 @@ impl fmt::Display for Declared {
                 write!(formatter, "({})", names.join(", "))
             }
             (None, Some((low, high))) => write!(formatter, "{} ({low}..{high})", self.of),
+            (None, None) if self.is_long => write!(formatter, "L{}", self.of),
             (None, None) => self.of.fmt(formatter),
         }
     }
@@ -146,7 +156,8 @@ impl fmt::Display for Declared {
 impl Point {
     /// How it is declared.
     pub fn declared(&self) -> Declared {
-        Declared { of: self.of, range: self.range, values: self.values.clone() }
+        let Self { of, range, is_long, .. } = *self;
+        Declared { of, range, values: self.values.clone(), is_long }
     }
 
     /// Its value in a packed image, zero-extended.
@@ -185,10 +196,18 @@ impl Points {
 
     /// As [`Self::push`], of a point that may have a subrange or names of values.
     pub fn push_declared(&mut self, name: impl Into<String>, declared: Declared, slot: u32) {
-        let Declared { of, range, values } = declared;
+        let Declared { of, range, values, is_long } = declared;
         let bit = self.width.next_multiple_of(of.bits());
         self.width = bit + of.bits();
-        self.points.push(Point { name: name.into(), of, range, values, bit, slot, initial: 0 });
+        let name = name.into();
+        self.points.push(Point { name, of, range, values, is_long, bit, slot, initial: 0 });
+    }
+
+    /// Tells which points are declared with the long name of their type.
+    pub fn declare_long(&mut self, is_long: impl Fn(&Point) -> bool) {
+        for point in &mut self.points {
+            point.is_long = is_long(point);
+        }
     }
 
     /// Gives each point the initial value of its variable.

@@ -15,7 +15,7 @@ use crate::types::Elementary;
 impl Declared {
     /// A stored value as it is written in a file of scans.
     pub fn write(&self, stored: u64) -> String {
-        self.value_name(stored).map_or_else(|| self.of.write(stored), str::to_owned)
+        self.value_name(stored).map_or_else(|| self.long(self.of.write(stored)), str::to_owned)
     }
 
     /// The stored value of a text of a file of scans; `None` where the declaration has no such value. Numbers outside a subrange are read.
