@@ -32,7 +32,7 @@ const fn row(
     Row { name, of, scan, file, shown, wrong, safe }
 }
 
-const POINTS: [Row; 14] = [
+const POINTS: [Row; 16] = [
     row("n", "INT", ["20", "20", "20", "40000", "0"]),
     row("d", "DINT", ["-70000", "-70000", "-70000", "3000000000", "0"]),
     row("t", "TIME", ["T#1s500ms", "\"1.5s\"", "1s500ms", "1.5", "\"0ms\""]),
@@ -47,11 +47,13 @@ const POINTS: [Row; 14] = [
     row("mot.speed", "INT", ["-7", "-7", "-7", "fast", "0"]),
     row("mot.wait", "TIME", ["T#20ms", "\"20ms\"", "20ms", "Auto", "\"0ms\""]),
     row("mot.mode", "Mode", ["Manual", "\"Manual\"", "Manual", "3.0", "\"Off\""]),
+    row("mot.steps[1]", "INT (1..4)", ["4", "4", "4", "0", "1"]),
+    row("mot.steps[2]", "INT (1..4)", ["1", "1", "1", "5", "1"]),
 ];
 
 const DECLARED: &str = "TYPE
   Mode : (Off, Manual := 3, Auto := 7);
-  Motor : STRUCT run : BOOL; speed : INT; wait : TIME; mode : Mode; END_STRUCT;
+  Motor : STRUCT run : BOOL; speed : INT; wait : TIME; mode : Mode; steps : ARRAY [1..2] OF INT (1..4); END_STRUCT;
 END_TYPE
 PROGRAM one
   VAR_INPUT n : INT; d : DINT; t : TIME; lt : LTIME; day : DATE; m : Mode; s : INT (3..9); bits : ARRAY [0..2] OF BOOL; mot : Motor; END_VAR
@@ -260,7 +262,7 @@ fn of_a_run(
     }
     run(folder, &["animate", "runs/latest", "--program", "one", "--from", "5", "--to", "30"]);
     let film = fs::read_to_string(folder.join("animation.svg")).expect("a picture");
-    assert!(film.contains("; 2 more outputs are not shown"), "{program}: {film}");
+    assert!(film.contains("; 4 more outputs are not shown"), "{program}: {film}");
     for Row { name, of, shown, .. } in &POINTS[..12] {
         assert!(film.contains(&format!(">q{name}</text>")), "{program}: {film}");
         assert!(*of == "BOOL" || film.contains(&format!(">{shown}</text>")), "{program}: {film}");
