@@ -58,7 +58,7 @@ END_PROGRAM
 fn arrays_within_structures_and_arrays_have_points() {
     let text = "TYPE
   Recipe : STRUCT fill : INT (0..50); steps : ARRAY [1..2] OF INT (1..4); go : ARRAY [0..1] OF BOOL; END_STRUCT;
-  Named : STRUCT n : INT; of : ARRAY [0..1] OF STRING; END_STRUCT;
+  Named : STRUCT n : INT; words : ARRAY [0..1] OF STRING; END_STRUCT;
   Many : STRUCT a : ARRAY [1..600] OF BOOL; b : ARRAY [1..600] OF BOOL; END_STRUCT;
 END_TYPE
 PROGRAM p
@@ -72,7 +72,7 @@ END_PROGRAM
     let lowered = lower(&file, &Options { text, ..Options::default() });
     let told: Vec<&str> = lowered.diagnostics.iter().map(|it| it.message.as_str()).collect();
     let expected = [
-        "the input `named` is NAMED with `named.of[0]` : STRING[254]: nothing writes it, and it keeps its initial value",
+        "the input `named` is NAMED with `named.words[0]` : STRING[254]: nothing writes it, and it keeps its initial value",
         "the output `many` is MANY with `many.b` : ARRAY [1..600] OF BOOL: only the program itself can read it",
     ];
     let same = |one: &str, other: &str| one.eq_ignore_ascii_case(other);
