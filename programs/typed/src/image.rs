@@ -10,8 +10,9 @@ use std::sync::Arc;
 use crate::operation::number_text::DAY;
 use crate::types::{Elementary, Enumeration};
 
-/// An input or output of a program.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// An input or output of a program. The hash of a program covers what its `Debug` writes, so that leaves out what changes no value: a program with
+/// LTIME in the place of TIME is the same one.
+#[derive(Clone, PartialEq, Eq)]
 pub struct Point {
     /// Its name, as declared.
     pub name: String,
@@ -150,6 +151,22 @@ impl fmt::Display for Declared {
             (None, None) if self.is_long => write!(formatter, "L{}", self.of),
             (None, None) => self.of.fmt(formatter),
         }
+    }
+}
+
+impl fmt::Debug for Point {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, of, range, values, is_long: _, bit, slot, initial } = self;
+        formatter
+            .debug_struct("Point")
+            .field("name", name)
+            .field("of", of)
+            .field("range", range)
+            .field("values", values)
+            .field("bit", bit)
+            .field("slot", slot)
+            .field("initial", initial)
+            .finish()
     }
 }
 
@@ -358,5 +375,17 @@ mod tests {
         assert_eq!(carried(mode(&[("Off", 0)]), 1), None);
         assert_eq!(carried(mode(&[("Off", 0), ("Auto", 1)]), 7), None);
         assert_eq!(carried(Elementary::Int.into(), 1), Some(1));
+    }
+
+    /// The hash of a program is of this text: stations and files of before know programs by it.
+    #[test]
+    fn what_the_hash_covers_of_a_point_stays() {
+        let mut points = Points::default();
+        points.push("t", Elementary::Time, 4);
+        let text = "Point { name: \"t\", of: Time, range: None, values: None, bit: 0, slot: 4, initial: 0 }";
+        for is_long in [false, true] {
+            points.declare_long(|_| is_long);
+            assert_eq!(format!("{:?}", points.iter().next().expect("a point")), text);
+        }
     }
 }
