@@ -166,8 +166,7 @@ impl Lowering<'_> {
         let elementary = resolved.of.elementary();
         let mut points = Vec::new();
         let root = (&resolved.of, resolved.range);
-        let all = self.points_of(root, (name.as_str(), 0), false, &mut points);
-        if is_point && all.is_err() {
+        if is_point && self.points_of(root, (name.as_str(), 0), false, &mut points).is_err() {
             let found = self.describe(&resolved.of);
             let message = format!(
                 "`{name}` at {address} is {found}; a point is a number, a bit or a time, or a structure of them"
