@@ -64,6 +64,7 @@ END_TYPE
 PROGRAM p
   VAR_INPUT r : Recipe; table : ARRAY [0..1] OF ARRAY [5..6] OF SINT; named : Named; END_VAR
   VAR_OUTPUT q : Recipe; sum : INT; many : Many; END_VAR
+  VAR memory AT %MW3 : INT; bit AT %MX9.0 : BOOL; END_VAR
   q := r; sum := table[1][6];
 END_PROGRAM
 ";
