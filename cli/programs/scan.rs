@@ -25,7 +25,8 @@ Example:
   understudy scan examples/heated-tank/level.st --digest 100000
 
 A line of the file holds the values of all inputs, with blanks between: BOOL as 0 or 1, integers and bit strings in decimal, REAL and LREAL
-as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds, values of enumerations by their names. A line `# NAME NAME ...` with the
+as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times as literals such as T#1s500ms and D#2024-02-29 or in
+nanoseconds, values of enumerations by their names. A line `# NAME NAME ...` with the
 names of all inputs gives the order of the values below it; without one it is that of the list `inputs` of --json: inputs at addresses and
 global ones first, then as they are declared. Empty lines and other lines that begin with # are skipped. Each scan is printed as `inputs -> outputs` in the same notation.
 With --digest, the inputs are pseudo-random and the same in every run. The digest of all outputs is equal on every processor and in every
@@ -248,7 +249,9 @@ fn expected(declared: &Declared) -> String {
         Elementary::Bool => "write 0 or 1".to_owned(),
         Elementary::Real => "write 8 hexadecimal digits, or a number with a point".to_owned(),
         Elementary::Lreal => "write 16 hexadecimal digits, or a number with a point".to_owned(),
-        _ if of.is_time() => "write nanoseconds, such as 1500000000 for 1.5 s".to_owned(),
+        _ if of.is_time() => {
+            format!("write a literal such as {}, or nanoseconds", of.text(1_500_000_000))
+        }
         _ => {
             let half = if of.is_signed() { of.mask() >> 1 } else { of.mask() };
             let least = if of.is_signed() { -i128::from(half) - 1 } else { 0 };

@@ -44,6 +44,9 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let (mut project, mut reports) = read(&arguments.project)?;
     narrow(arguments, &mut project)?;
+    let partly = project.partly_covered().into_iter();
+    let partly = partly.map(|message| Diagnostic::warning("U1252", message, 0..0));
+    reports[0].diagnostics.extend(partly);
     let outcome = analyse(&project).map_err(|failure| failed(&failure))?;
     for span in &outcome.idle {
         let message = "this relation affects no reachable state of the ladder";

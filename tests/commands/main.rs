@@ -26,6 +26,7 @@ mod outcomes;
 mod papers;
 mod pasted;
 mod petri;
+mod points;
 mod program_faults;
 mod reconfigure;
 mod rehearsal;

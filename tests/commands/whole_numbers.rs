@@ -47,24 +47,27 @@ const TYPES: [Row; 14] = [
         high: Shown { file: "\"Auto\"", scan: "Auto" },
         zero: "Off",
     },
-    row(
-        "TIME",
-        "",
-        Shown { file: "\"20ms\"", scan: "20000000" },
-        Shown { file: "\"1500ms\"", scan: "1500000000" },
-    ),
-    row(
-        "DATE",
-        "",
-        Shown { file: "\"1970-01-01\"", scan: "0" },
-        Shown { file: "\"2024-02-29\"", scan: "1709164800000000000" },
-    ),
-    row(
-        "TOD",
-        "",
-        Shown { file: "\"00:00:01\"", scan: "1000000000" },
-        Shown { file: "\"12:34:56.5\"", scan: "45296500000000" },
-    ),
+    Row {
+        of: "TIME",
+        register: "",
+        low: Shown { file: "\"20ms\"", scan: "T#20ms" },
+        high: Shown { file: "\"1500ms\"", scan: "T#1s500ms" },
+        zero: "T#0s",
+    },
+    Row {
+        of: "DATE",
+        register: "",
+        low: Shown { file: "\"1970-01-01\"", scan: "D#1970-01-01" },
+        high: Shown { file: "\"2024-02-29\"", scan: "D#2024-02-29" },
+        zero: "D#1970-01-01",
+    },
+    Row {
+        of: "TOD",
+        register: "",
+        low: Shown { file: "\"00:00:01\"", scan: "TOD#00:00:01" },
+        high: Shown { file: "\"12:34:56.5\"", scan: "TOD#12:34:56.5" },
+        zero: "TOD#00:00:00",
+    },
 ];
 
 const PERIOD: &str = "10ms";

@@ -113,7 +113,7 @@ fn subject(
     };
     let model = Model::of_program(typed, &asked).map_err(inexact)?;
     right(&|assumed| model.wrong_assumption(assumed))?;
-    model.exact().map_err(inexact)
+    model.exact().map_err(|found| inexact(found.told_by(typed)))
 }
 
 fn verification(

@@ -46,6 +46,7 @@ pub(super) fn of_program(
     };
     if arguments.smv.is_some() {
         let circuit = model.exact_circuit().map_err(|inexact| {
+            let inexact = inexact.told_by(program);
             let message = format!("--smv writes circuits, and the program has none: {inexact}");
             Answer::failed(Status::BadInput, "U0438", message)
         })?;

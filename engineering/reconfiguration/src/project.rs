@@ -11,7 +11,9 @@
 //! | U1207 | a number, a time or a word that is not possible |
 //! | U1208 | a file that cannot be read, or a ladder that is wrong |
 //! | U1251 | warning: a relation that concerns no state |
+//! | U1252 | warning: a number whose bits do not all fail at once |
 
+mod numbers;
 mod patience;
 mod relations;
 
@@ -54,6 +56,12 @@ const SIMULTANEOUS: usize = 2;
 
 /// A name that nothing has.
 fn unknown(what: &str, name: &str, span: Range<usize>, known: &[&str]) -> Diagnostic {
+    let bits = numbers::bits_of(name, known);
+    if bits > 0 {
+        let message = format!("`{name}` is a number, and each of its {bits} bits is an {what}");
+        return Diagnostic::error("U1205", message, span)
+            .with_help(format!("name its bits, from `{name}.0` for the lowest one on"));
+    }
     Diagnostic::error("U1205", format!("there is no {what} `{name}`"), span)
         .with_help(suggestion(name, known.iter().copied()))
 }

@@ -18,7 +18,7 @@ use tokio_modbus::ExceptionCode;
 use understudy_cluster::{Cluster, OperatorDeclaration, value_text};
 use understudy_executable::Interface;
 use understudy_remote_io::OperatorInputKind;
-use understudy_typed::{Elementary, Point};
+use understudy_typed::{Declared, Elementary, Point};
 use understudy_wire::{MAXIMUM_PROGRAMS, Member, ProgramId};
 
 use crate::error::GatewayError;
@@ -340,7 +340,9 @@ const MOST_NAMES: usize = 16;
 fn type_of(point: &Point) -> String {
     let known = point.values.iter().flat_map(|known| &known.values);
     let values = known.take(MOST_NAMES).map(|(name, value)| format!(", {value} {name}"));
-    format!("{}{}", point.of, values.collect::<String>())
+    // The register has the number of a value, so an enumeration is told by its integer.
+    let of = Declared { values: None, ..point.declared() };
+    format!("{of}{}", values.collect::<String>())
 }
 
 /// How an operator writes an input.

@@ -4,14 +4,15 @@
 
 mod picture;
 
-use understudy_typed::Elementary;
-use understudy_wire::{Image, Member, ProgramId, Source, StationId};
+use understudy_typed::{Elementary, Point};
+use understudy_wire::{Member, ProgramId, Source, StationId};
 
 use crate::error::ViewError;
 use crate::history::History;
 use crate::model::Model;
 use crate::station::StationState;
 use crate::timeline::Span;
+use crate::value::{is_declared, real, stored_text};
 
 /// Cycles of one film, at most.
 const MAXIMUM_CYCLES: i64 = 2_000;
@@ -48,6 +49,8 @@ pub struct Film {
     /// The first cycle, and the first one after the last.
     cycles: (i64, i64),
     outputs: Vec<Output>,
+    /// Outputs that are left out.
+    further: usize,
     sources: Vec<Span<Applied>>,
     stations: Vec<Station>,
     faults: Vec<(i64, String)>,
@@ -56,7 +59,18 @@ pub struct Film {
 #[derive(Debug, Clone)]
 struct Output {
     name: String,
-    values: Vec<Span<bool>>,
+    /// The least and the greatest value of these cycles; nothing for a BOOL.
+    range: Option<(String, String)>,
+    values: Vec<Span<Level>>,
+}
+
+/// A value as it is drawn.
+#[derive(Debug, Clone)]
+struct Level {
+    /// Where it is between the least and the greatest one, from 0 to 1.
+    share: f64,
+    /// As people read it; nothing for a BOOL.
+    text: Option<String>,
 }
 
 /// Where the applied outputs came from: the sending station is its place in [`Film::stations`].
@@ -100,13 +114,15 @@ impl Model {
         let sources = self.filmed_sources(program, (from, to), &stations);
         let faults = self.events().filter(|event| event.event == "fault");
         let faults = faults.filter(|event| (from..to).contains(&event.cycle));
+        let (outputs, further) = self.filmed_outputs(program, (from, to));
         Ok(Film {
             cluster: self.cluster().name().to_owned(),
             program: self.program_name(program).to_owned(),
             remote_io: self.members().name(Member::RemoteIo(program)).to_owned(),
             period_us: self.snapshot().period_us,
             cycles: (from, to),
-            outputs: self.filmed_outputs(program, (from, to)),
+            outputs,
+            further,
             sources,
             stations: stations
                 .iter()
@@ -205,23 +221,26 @@ impl Model {
         }
     }
 
-    fn filmed_outputs(&self, program: ProgramId, (from, to): (i64, i64)) -> Vec<Output> {
+    /// The first outputs, and how many are left out.
+    fn filmed_outputs(&self, program: ProgramId, (from, to): (i64, i64)) -> (Vec<Output>, usize) {
         let Some(images) = self.series().outputs(program) else {
-            return Vec::new();
+            return (Vec::new(), 0);
         };
         let interface = &self.cluster().controllers()[program.index()].interface;
-        let bits = interface.outputs.iter();
-        let bits = bits.filter(|output| output.of == Elementary::Bool);
-        bits.take(MAXIMUM_OUTPUTS)
-            .map(|output| Output {
-                name: output.name.clone(),
-                values: joined(images.spans(from, to).map(|span| Span {
-                    from: span.from,
-                    to: span.to,
-                    value: Image::get(span.value, output.bit as usize),
-                })),
-            })
-            .collect()
+        let filmed = interface.outputs.iter().filter_map(|output| {
+            let values = joined(images.spans(from, to).map(|span| Span {
+                from: span.from,
+                to: span.to,
+                value: output.get(span.value.words()),
+            }));
+            // A program fault that never was is not worth a trace.
+            let is_shown = is_declared(&output.name) || values.iter().any(|it| it.value != 0);
+            is_shown.then(|| levels(output, values))
+        });
+        let mut filmed: Vec<Output> = filmed.collect();
+        let further = filmed.len().saturating_sub(MAXIMUM_OUTPUTS);
+        filmed.truncate(MAXIMUM_OUTPUTS);
+        (filmed, further)
     }
 
     /// The source of each cycle, with the station whose frame the outputs came from.
@@ -248,6 +267,37 @@ impl Model {
                 value: Applied { source, sender },
             })
         }))
+    }
+}
+
+/// The stored values of an output as they are drawn.
+fn levels(output: &Point, values: Vec<Span<u64>>) -> Output {
+    let is_bool = output.of == Elementary::Bool;
+    let declared = output.declared();
+    let number = |stored: u64| real(output.of, stored);
+    let mut ordered: Vec<u64> = values.iter().map(|span| span.value).collect();
+    ordered.retain(|stored| number(*stored).is_finite());
+    ordered.sort_by(|one, other| number(*one).total_cmp(&number(*other)));
+    let ends = ordered.first().copied().zip(ordered.last().copied());
+    let (least, most) = match ends {
+        _ if is_bool => (0.0, 1.0),
+        Some((least, most)) => (number(least), number(most)),
+        None => (0.0, 0.0),
+    };
+    let level = |stored: u64| {
+        let share = (number(stored) / 2.0 - least / 2.0) / (most / 2.0 - least / 2.0);
+        Level {
+            share: if share.is_finite() { share } else { 0.0 },
+            text: (!is_bool).then(|| stored_text(&declared, stored)),
+        }
+    };
+    let text = |stored| stored_text(&declared, stored);
+    let spans = values.into_iter();
+    let spans = spans.map(|span| Span { from: span.from, to: span.to, value: level(span.value) });
+    Output {
+        name: output.name.clone(),
+        range: ends.filter(|_| !is_bool).map(|(least, most)| (text(least), text(most))),
+        values: spans.collect(),
     }
 }
 

@@ -17,6 +17,8 @@ use crate::value;
 pub struct ShownLine {
     /// From 1.
     pub line: u32,
+    /// The line of the file, from 1: the same for a text; of a document that of the element whose statement begins here.
+    pub file_line: Option<u32>,
     /// As it is written.
     pub text: String,
     /// Whether a statement in it was executed.
@@ -62,9 +64,8 @@ impl Model {
         program: ProgramId,
         cycle: i64,
     ) -> Option<(Vec<ShownLine>, Option<ViewError>)> {
-        let code = &self.controller_at(program, Some(cycle))?.code;
-        let (typed, text) = (code.typed(), code.source_text()?);
-        let source = SourceText::new(text);
+        let version = self.version_in(program, Some(cycle))?;
+        let (typed, source) = (version.controller().code.typed(), version.text()?);
         Some(match self.trace(program, cycle) {
             Ok(trace) => (lines(typed, &source, Some(&trace)), None),
             Err(error) => (lines(typed, &source, None), Some(error)),
@@ -73,12 +74,14 @@ impl Model {
 
     /// The variables of a program with numbers, and the lines that use them, of the one that runs.
     pub fn uses(&self, program: ProgramId) -> Option<Vec<Uses>> {
-        let code = &self.controller_at(program, None)?.code;
-        let (typed, text) = (code.typed(), code.source_text()?);
-        let source = SourceText::new(text);
+        let version = self.version_in(program, None)?;
+        let (typed, source) = (version.controller().code.typed(), version.text()?);
         let uses = typed.variables.iter().map(|variable| {
             let (mut written, mut read) = (BTreeSet::new(), BTreeSet::new());
-            for (number, line) in (1..).zip(source.lines()) {
+            let numbered = (1..).zip(source.lines());
+            for (number, line) in
+                numbered.filter_map(|(number, line)| Some((source.file_line(number)?, line)))
+            {
                 for (name, kind) in line.names.iter().filter(|_| line.is_program) {
                     match (kind, is_of(line, name, &variable.name)) {
                         (Use::Written, true) => drop(written.insert(number)),
@@ -120,13 +123,20 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         if !source.declares(routine) {
             continue;
         }
-        executed.insert(done.line);
+        // Of a line of a file with several statements.
+        let target = match done.effect {
+            Effect::Assigned { address, .. } if source.is_listing() => {
+                typed.part_at(address).map(|part| part.name)
+            }
+            _ => None,
+        };
+        executed.extend(source.shown_line(done.line, target.as_deref()));
         // A variable of a frame has no name but in the text.
         if let Effect::Assigned { address, value: Some((of, stored)), .. } = done.effect
             && address / 64 >= u64::from(typed.state)
-            && let Some((target, _)) = source.line(done.line).and_then(|it| it.split_once(":="))
+            && let Some(target) = source.assigned(done.line)
         {
-            let key = (routine.to_lowercase(), target.trim().to_lowercase());
+            let key = (routine.to_lowercase(), target.to_lowercase());
             temporary.insert(key, (of, stored));
         }
     }
@@ -157,9 +167,10 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         }
         ShownLine {
             line: number,
+            file_line: source.file_line(number),
             text: line.text.to_owned(),
             executed: executed.contains(&number),
-            failed: failed.is_some_and(|fault| fault.line == number),
+            failed: failed.is_some_and(|fault| source.shown_line(fault.line, None) == Some(number)),
             values,
         }
     });

@@ -1,9 +1,15 @@
 //! The text of a program with numbers: its lines, its units, and the names in each line.
+//!
+//! Of a program that is drawn the text is its listing. Lines of statements are those of the file, as errors and program faults name them.
+
+use understudy_interchange::Listing;
 
 /// A text by lines.
 #[derive(Debug, Clone)]
 pub(crate) struct SourceText<'t> {
     lines: Vec<Line<'t>>,
+    /// Of a file that is no text.
+    listing: Option<&'t Listing>,
 }
 
 /// A line of Structured Text.
@@ -99,7 +105,62 @@ impl<'t> SourceText<'t> {
                 unit = None;
             }
         }
-        Self { lines }
+        Self { lines, listing: None }
+    }
+
+    /// The text of a program in another form.
+    pub(crate) fn of_listing(listing: &'t Listing) -> Self {
+        Self { listing: Some(listing), ..Self::new(listing.text()) }
+    }
+
+    /// Whether the file is in another form.
+    pub(crate) fn is_listing(&self) -> bool {
+        self.listing.is_some()
+    }
+
+    /// The line of this text with the statement in a line of the file; of several the one that assigns `target`, else that which has the others in it.
+    pub(crate) fn shown_line(&self, file_line: u32, target: Option<&str>) -> Option<u32> {
+        let Some(listing) = self.listing else {
+            return Some(file_line).filter(|line| *line > 0);
+        };
+        let lines = listing.lines(file_line);
+        let mut assigning =
+            lines.iter().filter(|line| target.is_some_and(|it| self.assigns(**line, it)));
+        match (lines, assigning.next(), assigning.next()) {
+            ([only], ..) => Some(*only),
+            (_, Some(one), None) => Some(*one),
+            ([first, ..], ..) => Some(*first).filter(|_| listing.is_one(file_line)),
+            ([], ..) => None,
+        }
+    }
+
+    /// Whether a line begins with the assignment of a variable, or with the call of the instance that it is of.
+    fn assigns(&self, line: u32, target: &str) -> bool {
+        let begins = |head: &str, sign: &str| {
+            let text = self.line(line)?;
+            let own = text.get(..head.len()).filter(|own| own.eq_ignore_ascii_case(head))?;
+            text[own.len()..].trim_start().strip_prefix(sign)
+        };
+        let instance = target.rsplit_once('.').map(|(instance, _)| instance);
+        begins(target, ":=").is_some() || instance.is_some_and(|it| begins(it, "(").is_some())
+    }
+
+    /// The statement in a line of the file that assigns `target`, where it is known which.
+    pub(crate) fn statement(&self, file_line: u32, target: Option<&str>) -> Option<&'t str> {
+        self.line(self.shown_line(file_line, target)?)
+    }
+
+    /// What the statement in a line of the file assigns, as it is written; nothing where several do.
+    pub(crate) fn assigned(&self, file_line: u32) -> Option<&'t str> {
+        let lines = self.listing.map_or(std::slice::from_ref(&file_line), |it| it.lines(file_line));
+        let mut targets = lines.iter().filter_map(|line| self.line(*line)?.split_once(":="));
+        let (target, _) = targets.next()?;
+        targets.next().is_none().then_some(target.trim())
+    }
+
+    /// The line of the file with the statement that begins in a line of this text.
+    pub(crate) fn file_line(&self, line: u32) -> Option<u32> {
+        self.listing.map_or(Some(line), |listing| listing.file_line(line))
     }
 
     pub(crate) fn lines(&self) -> &[Line<'t>] {

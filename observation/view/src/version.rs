@@ -7,11 +7,12 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use understudy_cluster::Controller;
-use understudy_interchange::{Bodies, DrawnUnit, drawn_units};
+use understudy_interchange::{Bodies, DrawnUnit, Listing, drawn_units};
 use understudy_ladder::Observer;
 use understudy_typed::Interpreter;
 use understudy_wire::ProgramHash;
 
+use crate::source_text::SourceText;
 use crate::state_signal::{self, StateSignal};
 
 /// Programs in the place of one that are kept, at most.
@@ -24,6 +25,7 @@ pub(crate) struct Version {
     observer: OnceLock<Option<Observer>>,
     interpreter: OnceLock<Option<Interpreter>>,
     drawing: OnceLock<Vec<DrawnUnit>>,
+    listing: OnceLock<Option<Listing>>,
     signals: OnceLock<BTreeMap<String, StateSignal>>,
 }
 
@@ -34,6 +36,7 @@ impl Version {
             observer: OnceLock::new(),
             interpreter: OnceLock::new(),
             drawing: OnceLock::new(),
+            listing: OnceLock::new(),
             signals: OnceLock::new(),
         }
     }
@@ -56,16 +59,22 @@ impl Version {
         self.interpreter.get_or_init(interpreter).as_ref()
     }
 
+    /// Its text, of a program with statements: that of its file, or what the bodies of a document mean.
+    pub(crate) fn text(&self) -> Option<SourceText<'_>> {
+        let code = &self.controller.code;
+        let text = code.source_text()?;
+        let listing = self.listing.get_or_init(|| Listing::of(&code.source().file, text));
+        Some(listing.as_ref().map_or_else(|| SourceText::new(text), SourceText::of_listing))
+    }
+
     /// Its units as they are drawn, of a program with statements.
     pub(crate) fn drawing(&self) -> &[DrawnUnit] {
         self.drawing.get_or_init(|| {
             let Some(text) = self.controller.code.source_text() else {
                 return Vec::new();
             };
-            // A document begins with a sign that no Structured Text begins with.
-            let is_document = text.trim_start().starts_with('<');
-            let name = if is_document { "program.xml" } else { "program.st" };
-            drawn_units(name, text, Bodies::Blocks).unwrap_or_default()
+            drawn_units(&self.controller.code.source().file, text, Bodies::Blocks)
+                .unwrap_or_default()
         })
     }
 

@@ -252,9 +252,8 @@ impl Model {
         let stopped = missing == Some(Missing::ProgramFault);
         let failed = if stopped { history.fault_before(place) } else { None };
         let explained_by = self.version_at(history, failed.or(explained).unwrap_or(place))?;
-        let explained_by = explained_by.controller();
-        let code = &explained_by.code;
-        let because = match (explained_by.ladder(), code.source_text()) {
+        let code = &explained_by.controller().code;
+        let because = match (code.ladder(), explained_by.text()) {
             (Some(ladder), _) => explained
                 .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
                 .transpose()?,
@@ -294,7 +293,10 @@ impl Model {
             inputs_text: sampled
                 .next()
                 .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
-            of: text.and_then(|_| typed.part(name)?.declared()),
+            of: text.and_then(|_| match output {
+                Some(output) => Some(output.declared()),
+                None => typed.part(name)?.declared(),
+            }),
             ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: decided.and_then(|driven| self.reconstructed(program, step, driven)),

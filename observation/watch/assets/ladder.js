@@ -270,7 +270,7 @@ function showText(lines, forced) {
     id("ladder-picture").querySelector("tbody"),
     lines,
     (line) => `${program}:${line.line}`,
-    (line) => el("tr", {}, el("th", { scope: "row" }, String(line.line)), el("td", {}, el("code")), el("td", { class: "values" })),
+    (line) => el("tr", {}, el("th", { scope: "row" }, String(line.file_line ?? "")), el("td", {}, el("code")), el("td", { class: "values" })),
     (row, line) => {
       setAttribute(row, "data-executed", line.failed ? "failed" : String(line.executed));
       setText(row.querySelector("code"), line.text);

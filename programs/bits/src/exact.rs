@@ -11,6 +11,7 @@ use crate::circuit::{Derivation, Meaning, unique};
 use crate::execute::Unsupported;
 use crate::extent::Extent;
 use crate::layout::Layout;
+use crate::statements::told;
 use crate::system::System;
 use crate::term::{Node, Term, Variable};
 
@@ -34,6 +35,15 @@ impl Inexact {
         match self {
             Self::Differs(_) => Disagreement::CODE,
             Self::Unsupported(_) | Self::Gaps(_) => usual,
+        }
+    }
+
+    /// The same, where each value has the variable that takes it and the statement of the program in which it is met.
+    #[must_use]
+    pub fn told_by(self, program: &Program) -> Self {
+        match self {
+            Self::Gaps(gaps) => Self::Gaps(told(gaps, program)),
+            other => other,
         }
     }
 }
@@ -173,7 +183,7 @@ impl Exact {
             gaps.insert(Gap { what: point.name.clone(), of: point.of, at: None });
         }
         if !gaps.is_empty() {
-            return Err(Inexact::Gaps(gaps.into_iter().collect()));
+            return Err(Inexact::Gaps(gaps.into_iter().collect()).told_by(program));
         }
         let layout = Layout::new(program, &system, &derivation, &live);
         let circuit = pruned(&system, &derivation, &outputs, &live, stops);

@@ -16,6 +16,7 @@ mod extent;
 mod layout;
 mod number;
 mod program;
+mod statements;
 mod system;
 mod term;
 #[cfg(test)]

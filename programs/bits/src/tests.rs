@@ -1,6 +1,7 @@
 //! A system does what the machine does, and its circuit has every run of it.
 
 mod beside;
+mod inexact;
 mod timers;
 
 use std::collections::BTreeSet;

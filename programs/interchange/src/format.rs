@@ -240,7 +240,12 @@ fn no_circuit(text: &str, name: &str, inexact: &Inexact) -> Diagnostic {
     };
     // That of a library block is not in the text.
     let line = at.filter(|(routine, line)| routine.eq_ignore_ascii_case(name) && *line > 0);
-    let span = line.map_or(0..0, |(_, line)| Lines::new(text).range(line as usize - 1));
+    let span = line.map_or(0..0, |(_, line)| {
+        let whole = Lines::new(text).range(line as usize - 1);
+        let written = text.get(whole.clone()).unwrap_or_default();
+        let start = whole.start + (written.len() - written.trim_start().len());
+        start..start + written.trim().len()
+    });
     let message = format!("`{name}` is wanted as a circuit, and has none: {inexact}");
     Diagnostic::error(inexact.code_or("U0438"), message, span).with_help(
         "a circuit has BOOLs, bit strings, integers, timers and counters; scan, verify and stations take the program as it is",

@@ -62,8 +62,10 @@ pub(crate) fn rungs(text: &str, file: &File, typed: &Typed) -> Rungs {
         let refused = Refused { what: what.to_owned(), span: unit.name.span() };
         Rungs { diagnostics: vec![refusal(unit, refused)], ..Rungs::default() }
     };
-    let Body::Statements(statements) = &unit.body else {
-        return refused("its body is no list of statements");
+    let statements = match &unit.body {
+        Body::Statements(statements) => statements,
+        Body::Chart(_) => return refused("its body is a sequential function chart"),
+        Body::Instructions(_) => return refused("its body is an instruction list"),
     };
     if unit.extends.is_some() {
         return refused("it extends another unit");
@@ -308,6 +310,8 @@ impl<'f> Writer<'f> {
         }
         if !self.refused.is_empty() {
             let unit = self.unit;
+            // In the order of the file.
+            self.refused.sort_by_key(|refused| refused.span.start);
             let more = self.refused.len().saturating_sub(MAXIMUM_REFUSED);
             self.refused.truncate(MAXIMUM_REFUSED);
             if more > 0

@@ -284,7 +284,7 @@ fn types_of(of: &TypeName, names: &mut Vec<Name>) {
 }
 
 /// The text with names that can be written: the reader of drawn networks makes names with a dot, which no user can have declared.
-fn with_written_names(file: &File, text: String) -> String {
+pub(crate) fn with_written_names(file: &File, text: String) -> String {
     let mut made = Vec::new();
     for unit in &file.units {
         names_with_dots(unit, &mut made);

@@ -23,6 +23,7 @@ mod fold;
 mod idle;
 mod images;
 mod initial;
+mod long;
 mod names;
 mod numbers;
 mod places;
@@ -116,6 +117,7 @@ pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
     }
     lowering.declare(file, library);
     let checked = lowering.programs(file, options);
+    long::mark(&mut lowering.program, file);
     lowering.finish(checked)
 }
 

@@ -4,19 +4,35 @@ mod declaration;
 mod expression;
 mod statement;
 
-use crate::syntax::{Action, Body, Chart, Class, Declaration, File, Instruction, Unit, UnitKind};
+use crate::syntax::{
+    Action, Body, Chart, Class, Declaration, File, Instruction, Span, Unit, UnitKind,
+};
 
 pub use expression::{expression, initializer, type_name};
 
 /// A whole text: types, global variables, units, configuration.
 pub fn file(file: &File) -> String {
+    placed(file).text
+}
+
+/// A printed text, and where in it the statements are.
+#[derive(Debug, Clone, Default)]
+pub struct Placed {
+    /// The text.
+    pub text: String,
+    /// Each statement, instruction, transition and action of a step: where it stands in the text that was read, and its first byte in this one, in the order of this one.
+    pub places: Vec<(Span, usize)>,
+}
+
+/// As [`file()`], with the places of the statements.
+pub fn placed(file: &File) -> Placed {
     let mut printer = Printer::default();
     printer.types(&file.types);
     for unit in &file.units {
         printer.unit(unit);
     }
     printer.configuration(file);
-    printer.text
+    Placed { text: printer.text, places: printer.places }
 }
 
 /// Statements, each on its line or lines.
@@ -54,6 +70,8 @@ const INDENT: usize = 4;
 struct Printer {
     text: String,
     depth: usize,
+    /// Of [`Placed`].
+    places: Vec<(Span, usize)>,
 }
 
 impl Printer {
@@ -70,6 +88,11 @@ impl Printer {
         self.depth += 1;
         print(self);
         self.depth -= 1;
+    }
+
+    /// What is printed next is this part of the text that was read.
+    fn place(&mut self, span: &Span) {
+        self.places.push((span.clone(), self.text.len()));
     }
 
     fn comments(&mut self, comments: &[String]) {
@@ -142,6 +165,7 @@ impl Printer {
                     for indicator in &association.indicators {
                         inner += &format!(", {indicator}");
                     }
+                    printer.place(&association.action.span());
                     printer.line(&format!("{}({inner});", association.action));
                 }
             });
@@ -157,6 +181,7 @@ impl Printer {
                 header += &format!(" (PRIORITY := {priority})");
             }
             let (from, to) = (step_names(&transition.from), step_names(&transition.to));
+            self.place(&transition.span);
             self.line(&format!("{header} FROM {from} TO {to}"));
             let condition = format!(":= {};", expression(&transition.condition));
             self.within(|printer| printer.line(&condition));
@@ -198,6 +223,7 @@ impl Printer {
         } else {
             line += &format!("({})", printed(operands));
         }
+        self.place(&instruction.span);
         self.line(&line);
     }
 }

@@ -10,8 +10,9 @@ use std::sync::Arc;
 use crate::operation::number_text::DAY;
 use crate::types::{Elementary, Enumeration};
 
-/// An input or output of a program.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// An input or output of a program. The hash of a program covers what its `Debug` writes, so that leaves out what changes no value: a program with
+/// LTIME in the place of TIME is the same one.
+#[derive(Clone, PartialEq, Eq)]
 pub struct Point {
     /// Its name, as declared.
     pub name: String,
@@ -21,6 +22,8 @@ pub struct Point {
     pub range: Option<(i128, i128)>,
     /// The names of its values, where it is declared with an enumeration.
     pub values: Option<Arc<Enumeration>>,
+    /// It is declared with the long name of its type, such as LTIME.
+    pub is_long: bool,
     /// Its first bit in the image.
     pub bit: u32,
     /// Where it stands in the program's state, as a slot.
@@ -38,6 +41,8 @@ pub struct Declared {
     pub range: Option<(i128, i128)>,
     /// The names of the values of an enumeration.
     pub values: Option<Arc<Enumeration>>,
+    /// It is declared as LTIME, LDATE and the like, which have the values of TIME and DATE here.
+    pub is_long: bool,
 }
 
 impl Declared {
@@ -99,7 +104,12 @@ impl Declared {
 
     /// A stored value as a program writes it: `Auto`, and all else as [`Elementary::text`] has it.
     pub fn text(&self, stored: u64) -> String {
-        self.value_name(stored).map_or_else(|| self.of.text(stored), str::to_owned)
+        self.value_name(stored).map_or_else(|| self.long(self.of.text(stored)), str::to_owned)
+    }
+
+    /// The literal of a time in the form of its declaration: `LT#1s` of an LTIME.
+    pub(crate) fn long(&self, literal: String) -> String {
+        if self.is_long && literal.contains('#') { format!("L{literal}") } else { literal }
     }
 
     /// The name of a stored value of an enumeration; of several the first.
@@ -125,7 +135,7 @@ impl Declared {
 
 impl From<Elementary> for Declared {
     fn from(of: Elementary) -> Self {
-        Self { of, range: None, values: None }
+        Self { of, range: None, values: None, is_long: false }
     }
 }
 
@@ -138,15 +148,33 @@ impl fmt::Display for Declared {
                 write!(formatter, "({})", names.join(", "))
             }
             (None, Some((low, high))) => write!(formatter, "{} ({low}..{high})", self.of),
+            (None, None) if self.is_long => write!(formatter, "L{}", self.of),
             (None, None) => self.of.fmt(formatter),
         }
+    }
+}
+
+impl fmt::Debug for Point {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, of, range, values, is_long: _, bit, slot, initial } = self;
+        formatter
+            .debug_struct("Point")
+            .field("name", name)
+            .field("of", of)
+            .field("range", range)
+            .field("values", values)
+            .field("bit", bit)
+            .field("slot", slot)
+            .field("initial", initial)
+            .finish()
     }
 }
 
 impl Point {
     /// How it is declared.
     pub fn declared(&self) -> Declared {
-        Declared { of: self.of, range: self.range, values: self.values.clone() }
+        let Self { of, range, is_long, .. } = *self;
+        Declared { of, range, values: self.values.clone(), is_long }
     }
 
     /// Its value in a packed image, zero-extended.
@@ -185,10 +213,18 @@ impl Points {
 
     /// As [`Self::push`], of a point that may have a subrange or names of values.
     pub fn push_declared(&mut self, name: impl Into<String>, declared: Declared, slot: u32) {
-        let Declared { of, range, values } = declared;
+        let Declared { of, range, values, is_long } = declared;
         let bit = self.width.next_multiple_of(of.bits());
         self.width = bit + of.bits();
-        self.points.push(Point { name: name.into(), of, range, values, bit, slot, initial: 0 });
+        let name = name.into();
+        self.points.push(Point { name, of, range, values, is_long, bit, slot, initial: 0 });
+    }
+
+    /// Tells which points are declared with the long name of their type.
+    pub fn declare_long(&mut self, is_long: impl Fn(&Point) -> bool) {
+        for point in &mut self.points {
+            point.is_long = is_long(point);
+        }
     }
 
     /// Gives each point the initial value of its variable.
@@ -339,5 +375,17 @@ mod tests {
         assert_eq!(carried(mode(&[("Off", 0)]), 1), None);
         assert_eq!(carried(mode(&[("Off", 0), ("Auto", 1)]), 7), None);
         assert_eq!(carried(Elementary::Int.into(), 1), Some(1));
+    }
+
+    /// The hash of a program is of this text: stations and files of before know programs by it.
+    #[test]
+    fn what_the_hash_covers_of_a_point_stays() {
+        let mut points = Points::default();
+        points.push("t", Elementary::Time, 4);
+        let text = "Point { name: \"t\", of: Time, range: None, values: None, bit: 0, slot: 4, initial: 0 }";
+        for is_long in [false, true] {
+            points.declare_long(|_| is_long);
+            assert_eq!(format!("{:?}", points.iter().next().expect("a point")), text);
+        }
     }
 }

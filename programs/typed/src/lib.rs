@@ -49,4 +49,4 @@ pub use self::types::{
     Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,
 };
 pub use self::validate::Violation;
-pub use self::visit::Uses;
+pub use self::visit::{Uses, bodies};

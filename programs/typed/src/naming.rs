@@ -64,11 +64,14 @@ impl Elementary {
     /// The stored value of a date, a time of day or both as [`Self::text`] writes it, with its keyword, its short form or none before the `#`.
     pub fn moment(self, text: &str) -> Option<u64> {
         let text = text.to_ascii_uppercase();
+        // The long types have the same values.
+        let is_long = text.starts_with('L') && text.contains('#');
+        let text = if is_long { &text[1..] } else { &text };
         let stored = number_text::read(self, text.as_bytes());
         let written = self.text(stored);
         let (_, bare) = written.split_once('#')?;
         let keyword = format!("{self}#{bare}");
-        let is_written = [written.as_str(), bare, &keyword].contains(&text.as_str());
+        let is_written = [written.as_str(), bare, &keyword].contains(&text);
         (is_written && Declared::from(self).has(stored)).then_some(stored)
     }
 }

@@ -5,16 +5,17 @@
 //! | BOOL | `0` or `1` |
 //! | integers, bit strings | decimal |
 //! | REAL, LREAL | the hexadecimal bit pattern, 8 or 16 digits; read also as a decimal number with a point or an exponent |
-//! | TIME, DATE and their like | nanoseconds, decimal |
+//! | TIME, DATE and their like | the literal, such as `T#1s500ms`, `D#2024-02-29`; nanoseconds where it has none, such as a DATE within a day. Read also without the word before the `#`, and as nanoseconds |
 //! | enumerations | the name of the value; read also as a decimal number |
 
 use crate::image::Declared;
+use crate::operation::number_text;
 use crate::types::Elementary;
 
 impl Declared {
     /// A stored value as it is written in a file of scans.
     pub fn write(&self, stored: u64) -> String {
-        self.value_name(stored).map_or_else(|| self.of.write(stored), str::to_owned)
+        self.value_name(stored).map_or_else(|| self.long(self.of.write(stored)), str::to_owned)
     }
 
     /// The stored value of a text of a file of scans; `None` where the declaration has no such value. Numbers outside a subrange are read.
@@ -29,6 +30,11 @@ impl Elementary {
         match self {
             Self::Real => format!("{stored:08x}"),
             Self::Lreal => format!("{stored:016x}"),
+            _ if self.is_time() => {
+                let literal = self.text(stored);
+                let is_it = self.literal(&literal) == Some(stored);
+                if is_it { literal } else { self.signed(stored).to_string() }
+            }
             _ => self.signed(stored).to_string(),
         }
     }
@@ -50,11 +56,21 @@ impl Elementary {
             Self::Real | Self::Lreal if !text.contains(['.', 'e', 'E']) => None,
             Self::Real => text.parse().ok().map(|real: f32| u64::from(real.to_bits())),
             Self::Lreal => text.parse().ok().map(f64::to_bits),
-            _ => {
-                let number: i128 = text.parse().ok()?;
-                let stored = number as u64 & self.mask();
-                (self.signed(stored) == number).then_some(stored)
-            }
+            _ => self.whole(text).or_else(|| self.literal(text).filter(|_| self.is_time())),
+        }
+    }
+
+    fn whole(self, text: &str) -> Option<u64> {
+        let number: i128 = text.parse().ok()?;
+        let stored = number as u64 & self.mask();
+        (self.signed(stored) == number).then_some(stored)
+    }
+
+    /// The stored value of the literal of a time.
+    fn literal(self, text: &str) -> Option<u64> {
+        match self {
+            Self::Time => number_text::duration(text).map(i64::cast_unsigned),
+            _ => self.moment(text),
         }
     }
 }
@@ -69,6 +85,51 @@ mod tests {
             for stored in [0, 1, of.mask() >> 1, of.mask()] {
                 assert_eq!(of.read(&of.write(stored)), Some(stored), "{of} {stored}");
             }
+        }
+    }
+
+    #[test]
+    fn times_are_written_as_literals_and_read_as_nanoseconds_too() {
+        for (of, stored, written, others) in [
+            (
+                Elementary::Time,
+                1_500_000_000,
+                "T#1s500ms",
+                &["1500000000", "T#1.5s", "t#1500ms", "LTIME#1s_500ms"][..],
+            ),
+            (Elementary::Time, -1_000, "T#-1us", &["-1000", "-1us", "lt#-1000ns"]),
+            (
+                Elementary::Date,
+                1_709_164_800_000_000_000,
+                "D#2024-02-29",
+                &["DATE#2024-02-29", "2024-02-29"],
+            ),
+            (Elementary::Date, 1, "1", &[]),
+            (Elementary::TimeOfDay, 45_296_500_000_000, "TOD#12:34:56.5", &["12:34:56.5"]),
+            (Elementary::TimeOfDay, -1, "-1", &[]),
+            (Elementary::DateAndTime, 1_000_000_000, "DT#1970-01-01-00:00:01", &["1000000000"]),
+        ] {
+            let stored = i64::cast_unsigned(stored);
+            assert_eq!(of.write(stored), written, "{of}");
+            for text in others.iter().chain([&written]) {
+                assert_eq!(of.read(text), Some(stored), "{of} {text}");
+            }
+        }
+        for wrong in [
+            "T#",
+            "T#5",
+            "T#5s1",
+            "T#1ms1s",
+            "T#1s1s",
+            "TT#1s",
+            "D#1970-01-01",
+            "T#1.5s1ms",
+            "T#9999999999d",
+            "T#.s",
+            "1,5s",
+            "T#--1s",
+        ] {
+            assert_eq!(Elementary::Time.read(wrong), None, "{wrong}");
         }
     }
 

@@ -92,7 +92,7 @@ impl<'a> Uses<'a> {
 }
 
 /// The bodies within a statement.
-pub(crate) fn bodies(statement: &Statement) -> Vec<&[Statement]> {
+pub fn bodies(statement: &Statement) -> Vec<&[Statement]> {
     bodies_of(&statement.kind)
 }
 

@@ -2,13 +2,14 @@
 
 mod signs;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use understudy_journal::source_word;
 use understudy_text::markup::escaped;
 use understudy_wire::Source;
 
-use super::{Applied, Film};
+use super::{Applied, Film, Level, Output};
 use crate::timeline::Span;
 use signs::{Sign, of_source, of_state};
 
@@ -23,8 +24,10 @@ const REMOTE_IO_WIDTH: f64 = 380.0;
 const BAND_TOP: f64 = 262.0;
 const BAND_HEIGHT: f64 = 18.0;
 const LANE_HEIGHT: f64 = 27.0;
-/// The height of a 1 above a 0.
+/// The height of a 1 above a 0, and of the greatest value above the least one.
 const STEP_HEIGHT: f64 = 15.0;
+/// The width of a letter of a value at its trace, in units of the picture.
+const LETTER_WIDTH: f64 = 7.0;
 
 /// Of one turn, in seconds, and the share of it in which the cursor moves; then the whole picture stays.
 const TURN_S: f64 = 14.0;
@@ -143,8 +146,12 @@ impl<'f> Drawing<'f> {
         let recorded = (last + 1 - from) as f64 * period_ms / 1000.0;
         let shown = TURN_S * MOVING;
         let words = format!(
-            "{}: cycles {from} to {last} of {period_ms} ms each; {recorded:.1} s, shown in {shown:.0} s",
-            film.cluster
+            "{}: cycles {from} to {last} of {period_ms} ms each; {recorded:.1} s, shown in {shown:.0} s{}",
+            film.cluster,
+            match film.further {
+                0 => String::new(),
+                further => format!("; {further} more outputs are not shown"),
+            }
         );
         self.text((24.0, 50.0), "note", &words);
     }
@@ -246,6 +253,7 @@ impl<'f> Drawing<'f> {
         for (place, output) in film.outputs.iter().enumerate() {
             let zero = BAND_TOP + BAND_HEIGHT + 4.0 + LANE_HEIGHT * (place + 1) as f64;
             self.text((24.0, zero), "lane", &output.name);
+            self.values(zero, output);
             let _ = writeln!(
                 self.body,
                 "<line x1=\"{}\" x2=\"{}\" y1=\"{zero:.1}\" y2=\"{zero:.1}\" class=\"zero\"/>",
@@ -260,15 +268,42 @@ impl<'f> Drawing<'f> {
         }
     }
 
+    /// The values of a number where there is room, above the trace in the lower half and below it in the upper one; where there is not for each
+    /// of them, their range above the name.
+    fn values(&mut self, zero: f64, output: &Output) {
+        let Some((least, most)) = &output.range else {
+            return;
+        };
+        let mut shown = BTreeSet::new();
+        for span in &output.values {
+            let Level { share, text } = &span.value;
+            let Some(text) = text else {
+                continue;
+            };
+            let (left, right) = (self.film.x(span.from), self.film.x(span.to));
+            if right - left > LETTER_WIDTH * (text.chars().count() + 1) as f64 {
+                let y = zero - STEP_HEIGHT * share + if *share < 0.5 { -4.0 } else { 11.0 };
+                self.text((left + 3.0, y), "note", text);
+                shown.insert(text);
+            }
+        }
+        let mut texts = output.values.iter().filter_map(|span| span.value.text.as_ref());
+        let range = format!("{least} to {most}");
+        let fits = LETTER_WIDTH * range.chars().count() as f64 <= PLOT.0 - 24.0;
+        if fits && texts.any(|text| !shown.contains(text)) {
+            self.text((24.0, zero - 13.0), "note", &range);
+        }
+    }
+
     /// The values while they had one source.
-    fn trace(&self, values: &[Span<bool>], source: &Span<Applied>, zero: f64) -> String {
+    fn trace(&self, values: &[Span<Level>], source: &Span<Applied>, zero: f64) -> String {
         let mut path = String::new();
         for value in values {
             let (from, to) = (value.from.max(source.from), value.to.min(source.to));
             if from >= to {
                 continue;
             }
-            let y = if value.value { zero - STEP_HEIGHT } else { zero };
+            let y = zero - STEP_HEIGHT * value.value.share;
             let (left, right) = (self.film.x(from), self.film.x(to));
             let _ = match path.is_empty() {
                 true => write!(path, "M{left:.1} {y:.1}H{right:.1}"),

@@ -9,7 +9,7 @@ use std::rc::Rc;
 
 use serde_json::Value;
 use understudy_typed::{
-    Cause, Done, Effect, Elementary, Fault, Part, Program, Read, RoutineId, Trace,
+    Cause, Done, Effect, Elementary, Fault, Part, Point, Program, Read, RoutineId, Trace,
 };
 
 use super::{Reason, end_of_history};
@@ -51,13 +51,13 @@ impl<'m> Explainer<'m> {
         model: &'m Model,
         history: &'m History,
         program: &'m Program,
-        text: &'m str,
+        text: SourceText<'m>,
     ) -> Self {
         Self {
             model,
             history,
             program,
-            text: SourceText::new(text),
+            text,
             traces: HashMap::new(),
             count: 0,
             explained: HashSet::new(),
@@ -129,7 +129,7 @@ impl<'m> Explainer<'m> {
                 because: self.reads(&choice.done.reads, trace, place, depth, None),
                 ..assigned.clone()
             };
-            self.locate(&mut reason, routine, choice.done.line);
+            self.locate(&mut reason, routine, choice.done.line, None);
             reason
         });
         reasons.collect()
@@ -148,7 +148,7 @@ impl<'m> Explainer<'m> {
             ..self.leaf(name, None, at, text)
         };
         if let Some(routine) = fault.routine {
-            self.locate(&mut reason, routine, fault.line);
+            self.locate(&mut reason, routine, fault.line, None);
         }
         reason.because = match self.not_finite(&fault, &trace, at) {
             Some(output) => vec![output],
@@ -184,8 +184,10 @@ impl<'m> Explainer<'m> {
 
     fn leaf(&self, signal: &str, stored: Stored, place: usize, text: impl Into<String>) -> Reason {
         let declared = stored.map(|(of, _)| {
-            let part = self.program.part(signal);
-            let declared = part.and_then(|part| part.declared());
+            let Program { inputs, outputs, .. } = self.program;
+            let point = inputs.find(signal).or_else(|| outputs.find(signal));
+            let part = || self.program.part(signal).and_then(|part| part.declared());
+            let declared = point.map(Point::declared).or_else(part);
             declared.filter(|declared| declared.of == of).unwrap_or(of.into())
         });
         let value = declared.as_ref().zip(stored);
@@ -204,12 +206,13 @@ impl<'m> Explainer<'m> {
         }
     }
 
-    /// Gives a reason the line and the statement of the program's text; those of a library block are not in it.
-    fn locate(&self, reason: &mut Reason, routine: RoutineId, line: u32) {
+    /// Gives a reason the line and the statement of the program's text, of several in the line the one that assigns `target`; those of a library
+    /// block are not in it.
+    fn locate(&self, reason: &mut Reason, routine: RoutineId, line: u32, target: Option<&str>) {
         let routine = self.program.routine(routine);
         if self.text.declares(&routine.name) {
             reason.line = Some(line).filter(|line| *line > 0);
-            reason.statement = self.text.line(line).map(str::to_owned);
+            reason.statement = self.text.statement(line, target).map(str::to_owned);
         } else {
             reason.text += &format!(", in the library block {}", routine.name);
         }
@@ -225,13 +228,19 @@ impl<'m> Explainer<'m> {
         depth: usize,
     ) -> Reason {
         let done = &trace.done[write];
+        // An element of an array of inputs is a point, which is copied into the array before the program runs.
+        if let [read] = done.reads.as_slice()
+            && let Some(input) = self.input(read.address, place).filter(|it| it.signal == name)
+        {
+            return input;
+        }
         let stored = match done.effect {
             Effect::Assigned { value: Some(value), .. } => Some(value),
             Effect::Assigned { value: None, .. } => stored,
             Effect::Chose => None,
         };
         let mut reason = self.leaf(name, stored, place, "assigned");
-        self.locate(&mut reason, done.routine, done.line);
+        self.locate(&mut reason, done.routine, done.line, Some(name));
         if depth >= DEEPEST || self.count > MOST {
             reason.text += OMITTED;
             return reason;
@@ -314,9 +323,7 @@ impl<'m> Explainer<'m> {
                 self.written((&part.name, part.address, stored), trace, write, place, depth)
             }
             (Some(write), None) => {
-                let line = self.text.line(trace.done[write].line);
-                let target = line.and_then(|line| line.split_once(":="));
-                let name = target.map_or("temporary", |(target, _)| target.trim());
+                let name = self.text.assigned(trace.done[write].line).unwrap_or("temporary");
                 self.written((name, read.address, stored), trace, write, place, depth)
             }
             (None, Some(part)) => self.kept(&part, stored, place, depth),
@@ -390,7 +397,7 @@ impl<'m> Explainer<'m> {
         if since != place {
             reason.text += &self.kept_text(part, place, (done.routine, done.line));
         }
-        self.locate(&mut reason, done.routine, done.line);
+        self.locate(&mut reason, done.routine, done.line, Some(&part.name));
         if is_followed {
             let written = (part.name.as_str(), part.address, value);
             reason.because = self.written(written, &trace, write, writer, depth + 1).because;

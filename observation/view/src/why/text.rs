@@ -154,7 +154,8 @@ fn line(text: &mut String, reason: &Reason, parent: i64, zone: Zone) {
     });
     let written = match (reason.line, &reason.statement) {
         (Some(line), Some(statement)) => format!(" [line {line} \"{statement}\"]"),
-        _ => String::new(),
+        (Some(line), None) => format!(" [line {line}]"),
+        (None, _) => String::new(),
     };
     let _ = writeln!(text, "{} = {value}{when}: {}{rung}{written}", reason.signal, reason.text);
 }

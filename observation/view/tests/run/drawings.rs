@@ -181,6 +181,37 @@ fn the_active_step_is_marked() {
     assert!(seen.iter().all(|count| *count > 10), "{seen:?}");
 }
 
+/// The text of a document is what its elements mean, with the values of a scan and the lines of the file.
+#[test]
+fn a_drawn_program_is_a_text_with_the_lines_of_its_file() {
+    let text = CLUSTER.replace("\"blocks.st\"", "\"rungs.xml\"").replace("\"blocks\"", "\"rungs\"");
+    let model = model(&text);
+    let place = RUNGS.lines().position(|line| line.contains("<coil localId=\"8\""));
+    let file_line = u32::try_from(place.expect("a coil") + 1).expect("a short text");
+    let uses = model.uses(ProgramId(0)).expect("it has statements");
+    let idle = uses.iter().find(|uses| uses.name == "idle").expect("an output");
+    assert_eq!((&idle.written, idle.read.len()), (&vec![file_line], 0));
+    for cycle in [60, 75, 90] {
+        let (lines, error) = model.text_at(ProgramId(0), cycle).expect("it has statements");
+        assert!(error.is_none(), "{error:?}");
+        let own = lines.iter().find(|line| line.text.trim() == "idle := NOT run;");
+        let own = own.unwrap_or_else(|| panic!("{lines:?}"));
+        assert_eq!((own.file_line, own.executed), (Some(file_line), true));
+        let values = &model.snapshot_at(cycle).expect("known").programs[0].values;
+        for shown in &own.values {
+            assert_eq!(shown.value, values[shown.name.as_str()], "{}", shown.name);
+        }
+        assert_eq!(own.values.len(), 2, "{own:?}");
+        let head = lines.iter().find(|line| line.text == "PROGRAM rungs").expect("a unit");
+        assert_eq!((head.file_line, head.executed), (None, false));
+        let why = model.why("rungs.idle", Some(cycle)).expect("known");
+        let because = why.because.expect("a reason");
+        assert_eq!(because.line, Some(file_line));
+        assert_eq!(because.statement.as_deref(), Some("idle := NOT run;"));
+        assert_eq!(because.text, "assigned");
+    }
+}
+
 /// In many cycles: the power of a ladder goes where the scan computed it.
 #[test]
 fn contacts_and_wires_show_the_power() {

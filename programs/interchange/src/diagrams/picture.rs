@@ -12,7 +12,7 @@ use crate::format::Format;
 use crate::plcopen;
 use crate::source::Wanted;
 use crate::text::whole;
-use crate::typed_text::{Bodies, parsed};
+use crate::typed_text::{Bodies, parsed, with_written_names};
 
 /// A unit as it is drawn.
 #[derive(Debug, Clone)]
@@ -97,10 +97,10 @@ pub fn draw_typed(
     (Some(picture.svg(name)), diagnostics)
 }
 
-/// The units of the file `name` as Structured Text, and what was found in the file; nothing as for [`draw_typed`].
+/// The units of the file `name` as Structured Text that can be read again, and what was found in the file; nothing as for [`draw_typed`].
 pub fn listing(name: &str, text: &str, wanted: Wanted<'_>) -> (Option<String>, Vec<Diagnostic>) {
     let (file, diagnostics) = read(name, text, wanted);
-    (file.map(|file| print::file(&file)), diagnostics)
+    (file.map(|file| with_written_names(&file, print::file(&file))), diagnostics)
 }
 
 /// A file of a program with numbers without errors, and what was found in it.

@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use understudy_ladder::{
     BlockKind, Element, Language, Name, Namer, Program, Series, Signal, parse_address, visit,
 };
+use understudy_structured_text::print::type_name;
 use understudy_structured_text::syntax::{
     Class, Declaration, File, Initializer, Name as SourceName, Path, Span, TypeKind, Unit,
 };
-use understudy_typed::{Elementary, Interpreter, Program as Typed};
+use understudy_typed::{Interpreter, Point, Program as Typed};
 
 use super::drawn::{Uses, is_made};
 use super::lost::Lost;
@@ -44,19 +45,18 @@ pub(super) enum Known {
     Other(String),
 }
 
-/// Inputs and outputs of a program by their names in capitals, with their names and types.
+/// Inputs and outputs of a program by their names in capitals.
 #[derive(Debug, Default)]
 pub(super) struct Points {
-    inputs: BTreeMap<String, (String, Elementary)>,
-    outputs: BTreeMap<String, (String, Elementary)>,
+    inputs: BTreeMap<String, Point>,
+    outputs: BTreeMap<String, Point>,
 }
 
 impl Points {
     fn of(program: &Typed) -> Self {
         let named = |points: &understudy_typed::Points| {
             let own = points.iter().filter(|point| point.slot != 0);
-            own.map(|point| (point.name.to_ascii_uppercase(), (point.name.clone(), point.of)))
-                .collect()
+            own.map(|point| (point.name.to_ascii_uppercase(), point.clone())).collect()
         };
         Self { inputs: named(&program.inputs), outputs: named(&program.outputs) }
     }
@@ -142,11 +142,11 @@ impl<'f> Writer<'f> {
                     Known::Block { name: self.namer.name(&wanted(&declaration.name)), kind }
                 }
                 _ if BlockKind::of_word(&of.key()).is_some() => {
-                    Known::Other(format!("{}, with initial values or a body of its own", of.key()))
+                    Known::Other(format!("{of}, with initial values or a body of its own"))
                 }
-                _ => Known::Other(of.key()),
+                _ => Known::Other(of.to_string()),
             },
-            _ => Known::Other("no BOOL".to_owned()),
+            _ => Known::Other(type_name(&declaration.of)),
         };
         self.known.insert(key, known);
     }
@@ -218,7 +218,7 @@ impl<'f> Writer<'f> {
         ];
         let mut missing = Vec::new();
         for (points, signals, side) in sides {
-            for (key, (shown, of)) in points {
+            for (key, point) in points {
                 let is_signal = match self.known.get(key) {
                     Some(Known::Bit { name, .. }) => {
                         signals.iter().any(|it| it.name.as_str() == name)
@@ -226,15 +226,26 @@ impl<'f> Writer<'f> {
                     _ => false,
                 };
                 if !is_signal {
+                    // An element of an array or a part of a structure is a point of its own, and is declared with the whole.
+                    let whole = key.split(['[', '.']).next().unwrap_or(key);
                     let mut declared = self.unit.declarations.iter().chain(&self.file.globals);
-                    let place = declared.find(|found| found.name.key() == *key);
-                    let span = place.map_or(self.unit.name.span(), |found| found.name.span());
+                    let place = declared.find(|found| found.name.key() == whole);
+                    let (shown, of, span) = match place {
+                        Some(found) => {
+                            (found.name.as_str(), type_name(&found.of), found.name.span())
+                        }
+                        None => {
+                            let of = point.declared().to_string();
+                            (point.name.as_str(), of, self.unit.name.span())
+                        }
+                    };
                     let what = format!("its {side} `{shown}` : {of} is no signal of rungs");
                     missing.push(Refused { what, span });
                 }
             }
         }
         missing.sort_by_key(|refused| refused.span.start);
+        missing.dedup_by(|one, other| one.what == other.what);
         self.refused.extend(missing);
     }
 

@@ -1,8 +1,9 @@
 //! Variables at addresses: `%I` is an input point, `%Q` an output point, `%M` memory.
 
 use std::rc::Rc;
+use std::sync::Arc;
 
-use understudy_typed::{Declared, Elementary, Root, Type, indices};
+use understudy_typed::{Array, Declared, Elementary, Root, Type, indices};
 
 use crate::syntax::{Class, Declaration, Name, Retention, Span};
 
@@ -12,7 +13,24 @@ use super::names::{Symbol, Variable};
 use super::types::Resolved;
 
 /// Points that one variable may have.
-const MAXIMUM_POINTS: usize = 1_000;
+const MAXIMUM_POINTS: u64 = 1_000;
+
+/// Points of a variable.
+pub(super) enum Points {
+    /// One, with its name, its declaration and its slot.
+    One(String, Declared, u32),
+    /// Those of the elements of an array at a slot, which share its slots.
+    Elements(String, Arc<Array>, Declared, u32),
+}
+
+impl Points {
+    fn count(&self) -> u64 {
+        match self {
+            Self::One(..) => 1,
+            Self::Elements(_, array, ..) => array.length(),
+        }
+    }
+}
 
 /// A part of the inputs, the outputs or the memory, counted in two ways: by the size in the address, as CODESYS counts, and by bytes, as Siemens
 /// counts.
@@ -148,7 +166,7 @@ impl Lowering<'_> {
         let elementary = resolved.of.elementary();
         let mut points = Vec::new();
         let root = (&resolved.of, resolved.range);
-        if is_point && !self.points_of(root, name.as_str(), 0, &mut points) {
+        if is_point && self.points_of(root, (name.as_str(), 0), false, &mut points).is_err() {
             let found = self.describe(&resolved.of);
             let message = format!(
                 "`{name}` at {address} is {found}; a point is a number, a bit or a time, or a structure of them"
@@ -163,8 +181,10 @@ impl Lowering<'_> {
         self.overlap(name, address, resolved)?;
         let slot = self.state(resolved.of.slots(), &name.span())?;
         self.program.initial.extend(initial(&resolved.image, slot));
-        for (shown, declared, offset) in points {
-            self.point_at(shown, address, declared, slot + offset, is_input);
+        for point in points {
+            if let Points::One(shown, declared, offset) = point {
+                self.point_at(shown, address, declared, slot + offset, is_input);
+            }
         }
         Some(at_slot(name, slot, resolved, is_input))
     }
@@ -185,46 +205,58 @@ impl Lowering<'_> {
         known.push_declared(shown, declared, slot);
     }
 
-    /// The points of a variable of this type and subrange: itself, or the parts of a structure and the elements of arrays of structures. Whether
-    /// all of it has one.
+    /// The points of a variable of this type and subrange: itself, or the parts of a structure and the elements of arrays; those of arrays whose
+    /// elements share slots only `with_packed`. The type of the first part that can have none.
     pub(super) fn points_of(
         &self,
         (of, range): (&Type, Option<(i128, i128)>),
-        name: &str,
-        slot: u32,
-        points: &mut Vec<(String, Declared, u32)>,
-    ) -> bool {
-        if points.len() >= MAXIMUM_POINTS {
-            return false;
+        (name, slot): (&str, u32),
+        with_packed: bool,
+        points: &mut Vec<Points>,
+    ) -> Result<(), (String, Type)> {
+        let refused = || Err((name.to_owned(), of.clone()));
+        let known: u64 = points.iter().map(Points::count).sum();
+        if known >= MAXIMUM_POINTS {
+            return refused();
         }
         if let Some(declared) = self.program.declared(of) {
-            points.push((name.to_owned(), Declared { range, ..declared }, slot));
-            return true;
+            points.push(Points::One(name.to_owned(), Declared { range, ..declared }, slot));
+            return Ok(());
         }
         match of {
             Type::Structure(id, _) => {
                 let info = &self.structures[id.0 as usize];
-                let is_data = info.unit.is_none();
+                if info.unit.is_some() {
+                    return refused();
+                }
                 let mut fields = self.program.structures[id.0 as usize].fields.iter();
-                is_data
-                    && fields.all(|field| {
-                        let name = format!("{name}.{}", field.name);
-                        let of = (&field.of, info.ranges.get(&field.slot).copied());
-                        self.points_of(of, &name, slot + field.slot, points)
-                    })
+                fields.try_for_each(|field| {
+                    let name = format!("{name}.{}", field.name);
+                    let of = (&field.of, info.ranges.get(&field.slot).copied());
+                    self.points_of(of, (&name, slot + field.slot), with_packed, points)
+                })
             }
-            // Elements that share a slot have no point of their own.
-            Type::Array(array) => {
+            Type::Array(array) if array.stride().is_multiple_of(64) => {
                 let slots = (array.stride() / 64) as u32;
-                array.stride().is_multiple_of(64)
-                    && (0..array.length()).all(|at| {
-                        let Some(indices) = indices(array, at) else { return false };
-                        let of = (&array.element, range);
-                        let slot = slot + at as u32 * slots;
-                        self.points_of(of, &format!("{name}{indices}"), slot, points)
-                    })
+                (0..array.length()).try_for_each(|at| {
+                    let Some(indices) = indices(array, at) else { return refused() };
+                    let of = (&array.element, range);
+                    let slot = slot + at as u32 * slots;
+                    self.points_of(of, (&format!("{name}{indices}"), slot), with_packed, points)
+                })
             }
-            _ => false,
+            // Elements that share a slot have points that are copied.
+            Type::Array(array) => {
+                let declared = self.program.declared(&array.element).filter(|_| with_packed);
+                let fits = known + array.length() <= MAXIMUM_POINTS;
+                let Some(declared) = declared.filter(|_| fits) else {
+                    return refused();
+                };
+                let declared = Declared { range, ..declared };
+                points.push(Points::Elements(name.to_owned(), Arc::clone(array), declared, slot));
+                Ok(())
+            }
+            _ => refused(),
         }
     }
 

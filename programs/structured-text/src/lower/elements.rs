@@ -21,7 +21,7 @@ use super::places::{load, place};
 use super::types::Resolved;
 
 /// Elements that an array of points may have.
-pub(super) const MAXIMUM_ELEMENTS: u64 = 1_000;
+const MAXIMUM_ELEMENTS: u64 = 1_000;
 
 /// What is known of the elements of all arrays at addresses.
 #[derive(Default)]

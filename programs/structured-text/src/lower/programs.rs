@@ -5,16 +5,16 @@ use std::rc::Rc;
 
 use understudy_text::spelling;
 use understudy_typed::{
-    Declared, EdgeMemory, Elementary, Points, Program, Root, Task, Type, Variable as Shown,
+    EdgeMemory, Elementary, Points, Program, Root, Task, Type, Variable as Shown,
 };
 
 use crate::syntax::{
     Argument, Class, Declaration, Expression, File, Name, Retention, Span, Unit, UnitKind,
 };
 
+use super::addresses;
 use super::blocks::{Block, Key, Parameter};
 use super::called::roots;
-use super::elements::MAXIMUM_ELEMENTS;
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
 use super::tasks::{interval, shortest, task};
@@ -359,37 +359,42 @@ impl<'a> Lowering<'a> {
     }
 
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
-        if let Type::Array(array) = &variable.of
-            && array.stride() < 64
-            && array.length() <= MAXIMUM_ELEMENTS
-            && let Some(declared) = self.program.declared(&array.element)
-        {
-            let declared = Declared { range: variable.range, ..declared };
-            let root = (array.as_ref(), &declared, slot);
-            let points = self.elements_of(name, root, &variable.span, is_input);
-            for (name, own) in points.unwrap_or_default() {
-                self.points_mut(is_input).push_declared(name, declared.clone(), own);
-            }
-            return;
-        }
         let mut points = Vec::new();
         let root = (&variable.of, variable.range);
-        if !self.points_of(root, name, slot, &mut points) {
+        if let Err((part, of)) = self.points_of(root, (name, slot), true, &mut points) {
             let found = self.describe(&variable.of);
+            // Of a structure the part that is in the way.
+            let why = match part == name {
+                true => String::new(),
+                false => format!(" with `{part}` : {}", self.describe(&of)),
+            };
             let message = match is_input {
                 true => format!(
-                    "the input `{name}` is {found}: nothing writes it, and it keeps its initial value"
+                    "the input `{name}` is {found}{why}: nothing writes it, and it keeps its initial value"
                 ),
                 false => {
-                    format!("the output `{name}` is {found}: only the program itself can read it")
+                    format!(
+                        "the output `{name}` is {found}{why}: only the program itself can read it"
+                    )
                 }
             };
-            let help = "a point is a number, a bit, a time or a value of an enumeration, or one of up to 1,000 elements of an array of these; declare each part as a variable of its own, or use VAR";
+            let help = "a point is a number, a bit, a time or a value of an enumeration, or such a part of an array or a structure with up to 1,000 of them; declare each part as a variable of its own, or use VAR";
             self.warn("U1055", message, variable.span.clone(), help);
             return;
         }
-        for (name, declared, slot) in points {
-            self.points_mut(is_input).push_declared(name, declared, slot);
+        for point in points {
+            match point {
+                addresses::Points::One(name, declared, slot) => {
+                    self.points_mut(is_input).push_declared(name, declared, slot);
+                }
+                addresses::Points::Elements(name, array, declared, slot) => {
+                    let root = (array.as_ref(), &declared, slot);
+                    let elements = self.elements_of(&name, root, &variable.span, is_input);
+                    for (name, own) in elements.unwrap_or_default() {
+                        self.points_mut(is_input).push_declared(name, declared.clone(), own);
+                    }
+                }
+            }
         }
     }
 

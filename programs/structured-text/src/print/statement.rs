@@ -8,6 +8,7 @@ impl Printer {
     pub(super) fn statements(&mut self, statements: &[Statement]) {
         for statement in statements {
             self.comments(&statement.comments);
+            self.place(&statement.span);
             self.statement(&statement.kind);
         }
     }

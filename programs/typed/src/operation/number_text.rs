@@ -195,6 +195,47 @@ fn read_real(text: &str) -> &str {
     &text[..end]
 }
 
+/// The nanoseconds of a literal of TIME, `T#1s500ms`, whose word may be left out: units from the largest to the smallest, each once, the last one
+/// with a fraction; nothing for another text and for a time that has no value.
+pub(crate) fn duration(text: &str) -> Option<i64> {
+    let text = text.to_ascii_uppercase();
+    let bare = match text.split_once('#') {
+        Some(("T" | "TIME" | "LT" | "LTIME", bare)) => bare,
+        Some(_) => return None,
+        None => &text,
+    };
+    let (is_negative, mut rest) = read_sign(bare);
+    let (mut sum, mut last, mut is_last) = (0_i128, i64::MAX, false);
+    while !rest.is_empty() {
+        let end = rest.find(|letter: char| letter.is_ascii_alphabetic())?;
+        let (number, behind) = rest.split_at(end);
+        let end = behind.find(|letter: char| !letter.is_ascii_alphabetic());
+        let (unit, behind) = behind.split_at(end.unwrap_or(behind.len()));
+        let (_, size) = UNITS.into_iter().find(|(known, _)| unit.eq_ignore_ascii_case(known))?;
+        let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
+        let are_digits = |digits: &str| digits.bytes().all(|digit| digit.is_ascii_digit());
+        if is_last
+            || size >= last
+            || whole.is_empty()
+            || !are_digits(whole)
+            || !are_digits(fraction)
+        {
+            return None;
+        }
+        sum += whole.parse::<i64>().ok().map(i128::from)? * i128::from(size);
+        let mut part = i128::from(size);
+        for digit in fraction.bytes() {
+            // What is below a nanosecond is left out.
+            sum += part * i128::from(digit - b'0') / 10;
+            part /= 10;
+        }
+        (last, is_last) = (size, number.contains('.'));
+        rest = behind.trim_start_matches('_');
+    }
+    let is_empty = last == i64::MAX;
+    i64::try_from(if is_negative { -sum } else { sum }).ok().filter(|_| !is_empty)
+}
+
 fn read_duration(text: &str) -> i64 {
     let (is_negative, mut rest) = read_sign(behind_hash(text));
     let mut sum = 0_i64;

@@ -118,7 +118,7 @@ fn different_point(before: &Code, after: &Code) -> Option<String> {
             }
             if !is_equal {
                 let point = new.get(place).or(old.get(place))?;
-                return Some(format!("{side} `{}` of type {}", point.name, point.of));
+                return Some(format!("{side} `{}` of type {}", point.name, point.declared()));
             }
         }
     }

@@ -59,9 +59,15 @@ PROGRAM {}
 }
 
 fn line((terminal, signal): &Named<'_>) -> String {
-    let note = signal.note.as_ref().map(|note| format!("  // {note}"));
+    let values = signal.declared.values.as_ref().map(|known| {
+        let values = known.values.iter().map(|(name, value)| format!("{name} = {value}"));
+        format!("{}: {}", signal.declared, values.collect::<Vec<_>>().join(", "))
+    });
+    let notes: Vec<&str> = signal.note.as_deref().into_iter().chain(values.as_deref()).collect();
+    let note = if notes.is_empty() { String::new() } else { format!("  // {}", notes.join("; ")) };
+    // The program has a type of its own: the names of its values are not known here.
     let declared = Declared { values: None, ..signal.declared.clone() };
-    format!("{terminal} : {declared};{}", note.unwrap_or_default())
+    format!("{terminal} : {declared};{note}")
 }
 
 fn declare(text: &mut String, block: &str, lines: &mut dyn Iterator<Item = String>) {
@@ -95,11 +101,25 @@ fn push_moves(text: &mut String, stub: &Stub<'_>, moving: &[&Named<'_>], period:
         let _ = match values(signal) {
             Some((usual, other)) => writeln!(
                 text,
-                "  IF {is_on} THEN {terminal} := {other}; ELSE {terminal} := {usual}; END_IF;"
+                "  IF {is_on} THEN {terminal} := {other}; ELSE {terminal} := {usual}; END_IF;{}",
+                names(signal).unwrap_or_default()
             ),
             None => writeln!(text, "  {terminal} := {is_on};"),
         };
     }
+}
+
+/// The names of the other and the usual value of an enumeration, as a comment.
+fn names(signal: &Signal) -> Option<String> {
+    let (usual, other) = ends(signal);
+    let name = |value: i128| signal.declared.value_name(value as u64);
+    Some(format!("  // {}, else {}", name(other)?, name(usual)?))
+}
+
+/// The whole numbers that are nearest to 0 and to 100 of those that a signal can have, or to -100 where these are one.
+fn ends(signal: &Signal) -> (i128, i128) {
+    let (usual, above) = (signal.nearest(0), signal.nearest(100));
+    (usual, if above == usual { signal.nearest(-100) } else { above })
 }
 
 /// The usual and the other value of a number: the nearest to 0 and to 100 that it can have, or to -100 where these are one. Nothing for a BOOL.
@@ -114,8 +134,7 @@ fn values(signal: &Signal) -> Option<(String, String)> {
         Elementary::DateAndTime => pair("DT#1970-01-01-00:00:00", "DT#2000-01-01-00:00:00"),
         _ if of.is_real() => pair("0.0", "100.0"),
         _ => {
-            let (usual, above) = (signal.nearest(0), signal.nearest(100));
-            let other = if above == usual { signal.nearest(-100) } else { above };
+            let (usual, other) = ends(signal);
             let number = |value: i128| format!("{of}#{value}");
             Some((number(usual), number(other)))
         }
