@@ -12,7 +12,7 @@ use understudy_remote_io::Event;
 use understudy_wire::{Image, Lineage, Member, Moment, Source, Step, Time};
 
 use super::steps::scan;
-use super::{Referee, Violation};
+use super::{Referee, State, Violation};
 
 /// Samples that do not count yet, at most, for ten minutes of 10 ms cycles; the oldest are forgotten.
 const PENDING: usize = 65_536;
@@ -136,13 +136,16 @@ impl Referee {
 
     /// h(x(t), u(t)) of an earlier sample without a change mark, where the states before and after it are remembered.
     fn truth_of(&mut self, moment: Moment, inputs: &Image) -> Option<Image> {
-        let after = self.states.iter().rev().find(|state| state.stepped == moment)?;
-        let (program, lineage) = (after.program, after.lineage);
-        let before = self
-            .states
-            .iter()
-            .rev()
-            .find(|state| state.program == program && state.lineage.after(inputs) == lineage)?;
+        // A sample without a record leads to a state of the cycle before it, so only one that begins in an earlier cycle is that of this one.
+        let mut of_cycle = self.states.iter().rev().filter(|state| state.stepped == moment);
+        let before = of_cycle.find_map(|after| {
+            let leads = |state: &&State| {
+                let is_earlier = state.program == after.program && state.stepped != moment;
+                is_earlier && state.lineage.after(inputs) == after.lineage
+            };
+            self.states.iter().rev().find(leads)
+        })?;
+        let program = before.program;
         let mut bits = before.bits.clone();
         let executable = &self.programs.of(program)?.executable;
         Some(scan(executable, &mut self.scratch, &mut bits, inputs))

@@ -432,6 +432,18 @@ fn outputs_recorded_after_those_of_a_successor_are_judged_by_their_own_cycle() {
         assert_eq!(unknown.observe_from(author, Time(38), &event), Ok(()), "{event:?}");
         assert_eq!(unknown.gaps(), 1, "{event:?}");
     }
+    // The sample of cycle 2 has no record, and is no sample of cycle 1.
+    let mut unrecorded = self::referee();
+    unrecorded.saw(&bit(true));
+    assert_eq!(unrecorded.observe_from(author, Time(10), &sampled(1, true)), Ok(()));
+    unrecorded.starts_again();
+    for (at, event) in [(30, sampled(3, true)), (38, direct(3, false))] {
+        assert_eq!(unrecorded.observe_from(successor, Time(at), &event), Ok(()), "{event:?}");
+    }
+    let found = unrecorded.clone().observe_from(author, Time(18), &direct(1, false));
+    assert!(matches!(found, Err(Violation::Wrong { truth: Some(_), .. })), "{found:?}");
+    assert_eq!(unrecorded.observe_from(author, Time(18), &direct(1, true)), Ok(()));
+    assert_eq!(unrecorded.gaps(), 0);
 }
 
 #[derive(Debug)]
