@@ -41,7 +41,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Arrival, Descent, Input, Machine, Output, Outvoted, Participant, RemoteIoInput,
+    Arrival, Descent, Input, Layout, Machine, Output, Outvoted, Participant, RemoteIoInput,
 };
 use understudy_wire::{
     Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
@@ -68,6 +68,8 @@ use writing::Writing;
 #[derive(Debug, Clone)]
 pub struct RemoteIo {
     settings: Settings,
+    /// Points of the program that takes the newest sample.
+    layout: Arc<Layout>,
     member: Participant<Event>,
     holders: Holders,
     knowledge: Knowledge,
@@ -201,16 +203,16 @@ impl RemoteIo {
             knowledge: Knowledge::default(),
             question: None,
             authority: Authority::Proof,
-            sensors: settings.pair.is_none().then(|| settings.undriven.clone()),
-            field: settings.undriven.clone(),
+            sensors: settings.pair.is_none().then(|| settings.layout.undriven.clone()),
+            field: settings.layout.undriven.clone(),
             sampled_at: now,
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
-            diagnosed: Image::zero(settings.undriven.width()),
+            diagnosed: Image::zero(settings.layout.input_width()),
             looked: now,
             protection: Protection::default(),
             resumed: None,
             forcing: Forcing::default(),
-            writing: Writing::new(&settings.operator_inputs),
+            writing: Writing::new(&settings.layout.operator_inputs),
             signals: Signals::new(&settings),
             noting: Noting::default(),
             turns: vec![None; stations],
@@ -223,6 +225,7 @@ impl RemoteIo {
             trust: Trust::default(),
             differed: Vec::new(),
             replacing: Replacing::default(),
+            layout: Arc::clone(&settings.layout),
             settings,
         };
         remote_io.member.wake_at(remote_io.next_wakeup());
@@ -256,7 +259,7 @@ impl RemoteIo {
             // Samples of other programs start no cycle here: they only prove signals.
             (Member::RemoteIo(program) | Member::Twin(program), Body::Sample(sample)) => {
                 if self.member.admits(now, &frame.header) {
-                    let sources = &self.settings.signal_sources;
+                    let sources = &self.layout.signal_sources;
                     let moment = frame.header.moment;
                     self.signals.note(sources, program, moment, sample);
                 }
@@ -299,7 +302,7 @@ impl RemoteIo {
     fn take(&mut self, now: Time, input: RemoteIoInput<'_>) {
         match input {
             RemoteIoInput::Field(sensors) => {
-                if sensors.width() == self.settings.undriven.width() {
+                if sensors.width() == self.layout.input_width() {
                     self.sensors = Some(sensors.clone());
                 }
             }
@@ -357,7 +360,7 @@ impl RemoteIo {
             self.holders.note_retained(station, retained);
         }
         let recalled = recalled.iter().find(|recalled| {
-            recalled.program == program && recalled.inputs.width() == self.settings.undriven.width()
+            recalled.program == program && recalled.inputs.width() == self.layout.input_width()
         });
         self.holders.note(station, own, recalled, alone);
         if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)

@@ -129,7 +129,7 @@ impl Referee {
             is_new: false,
             unjudged: None,
             gaps: 0,
-            unrecorded: Unrecorded::new(settings.sourced_bits()),
+            unrecorded: Unrecorded::new(settings.layout.sourced_bits()),
             pair: Pair::default(),
             choice: 0,
             cold_starts: 0,

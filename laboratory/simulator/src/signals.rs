@@ -22,7 +22,7 @@ pub(crate) struct SignalReferee {
 
 impl SignalReferee {
     pub(crate) fn new(readers: &[Settings]) -> Self {
-        let signals = readers.iter().flat_map(|reader| &reader.signals);
+        let signals = readers.iter().flat_map(|reader| &reader.layout.signals);
         Self {
             read: signals.map(|signal| signal.from).collect(),
             truths: vec![VecDeque::new(); readers.len()],
@@ -53,7 +53,7 @@ impl SignalReferee {
         moment: Moment,
         inputs: &Image,
     ) -> Option<Violation> {
-        let mut signals = settings.signals.iter();
+        let mut signals = settings.layout.signals.iter();
         let wrong = signals.find(|signal| {
             let value = signal.place.get(inputs);
             let truths = &self.truths[signal.from.index()];

@@ -8,9 +8,11 @@
 mod agreement;
 mod attendance;
 mod change;
+mod channel;
 mod clock;
 mod copies;
 mod fallback;
+mod layout;
 mod machine;
 mod participant;
 mod place;
@@ -18,6 +20,7 @@ mod ramp;
 mod reception;
 mod schedule;
 mod shared;
+mod source;
 pub mod spare;
 mod waking;
 
@@ -27,12 +30,15 @@ pub use change::{
     ChangeOrder, Changing, Conversion, FallbackChange, OnlineChange, Program, ProgramChange,
     Versions,
 };
+pub use channel::Channel;
 pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
 pub use fallback::{Fallback, Release, Restart, StaleState, ValueFault};
+pub use layout::{Layout, StopPoints};
 pub use machine::{Input, Machine, Output, Outvoted, RemoteIoInput};
 pub use participant::{Endpoint, Notice, Participant, Refusal};
 pub use place::{PointPlace, in_order};
 pub use ramp::{Descent, Ramp};
 pub use schedule::{Schedule, ScheduleError, Turns};
 pub use shared::SharedOutputs;
+pub use source::{OperatorInput, OperatorInputKind, SignalInput, SignalSource, ValueMismatch};

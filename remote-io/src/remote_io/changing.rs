@@ -206,7 +206,7 @@ impl RemoteIo {
     /// Whether a program that a change mark brings is on trial. What the program of its own configuration does is no matter of the change.
     fn is_tried(&self, program: ProgramHash) -> bool {
         program != self.hash()
-            && self.settings.stop.is_some()
+            && self.layout.stop.is_some()
             && self.settings.fallback.trial_cycles > 0
     }
 

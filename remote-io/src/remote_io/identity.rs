@@ -9,6 +9,8 @@ impl Hash for RemoteIo {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {
             settings: _,
+            // It follows from the history.
+            layout: _,
             member,
             holders,
             knowledge,

@@ -307,7 +307,7 @@ impl RemoteIo {
         if self.knowledge.floor().is_none() {
             self.remember(moment, state);
         }
-        let void = self.writing.lose(&self.settings.operator_inputs, moment, |_| true);
+        let void = self.writing.lose(&self.layout.operator_inputs, moment, |_| true);
         self.report_void(&void);
         if state.is_none() && self.is_first_start() {
             self.take_up_writes();
@@ -336,7 +336,7 @@ impl RemoteIo {
             } else {
                 None
             };
-            self.writing.recall(&self.settings.operator_inputs, recalled, missed);
+            self.writing.recall(&self.layout.operator_inputs, recalled, missed);
         }
         let stations = self.holders.excluded();
         if !self.knowledge.pardons() && !stations.is_empty() {

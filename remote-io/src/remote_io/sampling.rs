@@ -3,7 +3,6 @@
 use understudy_wire::{Body, Image, Moment, Sample, Source, Step, Time, WriteId};
 
 use super::{Authority, Execution, RemoteIo};
-use crate::channel;
 use crate::diagnosis::Observation;
 use crate::event::Event;
 
@@ -34,8 +33,7 @@ impl RemoteIo {
                 self.report(Event::Diagnosed { moment, failed });
             }
         }
-        let channels = &self.settings.channels;
-        self.field = channel::seen(channels, &self.field, &shown, unsteady.as_ref());
+        self.field = self.layout.seen(&self.field, &shown, unsteady.as_ref());
     }
 
     /// Takes u(i)(t) and sends it. Where the sensors are not known no sample is sent, so that no station steps the
@@ -54,7 +52,7 @@ impl RemoteIo {
         let Some(run) = self.knowledge.run_mut() else {
             return;
         };
-        let operator_inputs = &self.settings.operator_inputs;
+        let operator_inputs = &self.layout.operator_inputs;
         let history = &mut run.history;
         let places =
             self.holders.holdings().filter_map(|(_, holding)| history.place(holding.lineage));
@@ -69,11 +67,11 @@ impl RemoteIo {
         let mut void_writes = self.writing.lose(operator_inputs, moment, is_lost);
         let mut unforced = self.field.clone();
         self.writing.put(operator_inputs, history.newest(), &mut unforced);
-        let validity = self.signals.put(&self.settings.signals, moment, &mut unforced);
+        let validity = self.signals.put(&self.layout.signals, moment, &mut unforced);
         let mut inputs = self.forcing.inputs(unforced.clone());
         let before_change = history.program();
         let (change, resets) = self.replacing.next(history, self.program);
-        if let Some(stop) = self.settings.stop
+        if let Some(stop) = self.layout.stop
             && resets
         {
             inputs.set(stop.reset, true);

@@ -17,8 +17,8 @@ use super::RemoteIo;
 use crate::event::Event;
 use crate::selection::{Received, Selection};
 use crate::settings::Settings;
-use crate::source::{SignalInput, SignalSource};
 use crate::trust::Trust;
+use understudy_cycle::{SignalInput, SignalSource};
 
 /// Values of signals, and what proves the next ones.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -54,13 +54,13 @@ struct Taken {
 
 impl Signals {
     pub(super) fn new(settings: &Settings) -> Self {
-        let taken = settings.signals.iter().map(|signal| Taken {
+        let taken = settings.layout.signals.iter().map(|signal| Taken {
             stored: signal.default,
             of: None,
             age: 0,
             is_valid: false,
         });
-        Self { proofs: vec![None; settings.signal_sources.len()], taken: taken.collect() }
+        Self { proofs: vec![None; settings.layout.signal_sources.len()], taken: taken.collect() }
     }
 
     /// Keeps the newest sample of a source.
@@ -146,7 +146,7 @@ impl RemoteIo {
     pub(super) fn take_signals(&mut self) {
         let moment = self.moment();
         let received = self.received();
-        let sources = self.settings.signal_sources.iter().enumerate();
+        let sources = self.layout.signal_sources.iter().enumerate();
         let outputs: Vec<Option<Image>> = sources
             .map(|(place, source)| self.signals.outputs(place, source, moment, received))
             .collect();
@@ -166,9 +166,9 @@ impl RemoteIo {
         outputs: impl Fn(ProgramId, &[SignalSource]) -> Option<&'a Image>,
     ) {
         let moment = self.moment();
-        let signals = self.settings.signals.iter().zip(&mut self.signals.taken);
+        let signals = self.layout.signals.iter().zip(&mut self.signals.taken);
         for (signal, taken) in signals {
-            match outputs(signal.from, &self.settings.signal_sources) {
+            match outputs(signal.from, &self.layout.signal_sources) {
                 Some(outputs) => {
                     taken.stored = signal.value_in(outputs);
                     taken.of = Some(moment);

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Agreement, Fallback, Input, Machine, Mode, Output, PointPlace, Release, RemoteIoInput,
-    Schedule, SharedOutputs, StaleState, ValueFault,
+    Agreement, Fallback, Input, Layout, Machine, Mode, Output, Release, RemoteIoInput, Schedule,
+    SharedOutputs, StaleState, ValueFault,
 };
 use understudy_testing::states::Table;
 use understudy_wire::{
@@ -89,14 +89,7 @@ impl Bench {
             program: PROGRAM,
             agreement: Arc::new(agreement),
             hash: ProgramHash(1),
-            undriven: Image::zero(1),
-            input_points: PointPlace::booleans(1),
-            output_points: PointPlace::booleans(1),
-            operator_inputs: Vec::new(),
-            signals: Vec::new(),
-            signal_sources: Vec::new(),
-            channels: Vec::new(),
-            stop: None,
+            layout: Arc::new(Layout::booleans(1, 1)),
             diagnosis: None,
             fallback: Fallback {
                 hold_cycles: 2,

@@ -58,7 +58,7 @@ impl RemoteIo {
     pub fn noting(mut self, found: Option<Note>, is_damaged: bool) -> Self {
         let number = found.as_ref().map_or(0, |note| note.number.saturating_add(1));
         let cluster = self.settings.agreement.cluster;
-        let width = self.settings.undriven.width();
+        let width = self.layout.input_width();
         let found = found.filter(|note| {
             note.cluster == cluster && note.recalled.program == self.settings.program
         });
@@ -155,7 +155,7 @@ impl RemoteIo {
                 excluded: self.trust.excluded(),
                 accounted_for: StationSet::EMPTY,
                 writes: self.writing.ids(),
-                pulses: self.writing.pulses(&self.settings.operator_inputs),
+                pulses: self.writing.pulses(&self.layout.operator_inputs),
                 inputs,
             },
         });
@@ -330,7 +330,7 @@ impl RemoteIo {
     /// that sample: this remote I/O takes their values from its newest note. The sample after the note was not applied as far as that tells, so no write
     /// was answered that is in it.
     pub(super) fn old_inputs(&self, stepped: Moment) -> Option<OldInputs> {
-        let retains = self.settings.operator_inputs.iter().any(|input| input.retains);
+        let retains = self.layout.operator_inputs.iter().any(|input| input.retains);
         if !retains || !self.is_first_start() {
             return None;
         }
@@ -352,7 +352,7 @@ impl RemoteIo {
 
     /// The newest note that has the inputs of its program.
     fn usable_note(&self) -> Option<&Note> {
-        let width = self.settings.undriven.width();
+        let width = self.layout.input_width();
         let last = self.noting.last.as_ref();
         last.filter(|note| note.recalled.inputs.width() == width)
     }
@@ -361,7 +361,7 @@ impl RemoteIo {
     /// were in effect.
     pub(super) fn take_up_writes(&mut self) {
         if let Some(recalled) = self.usable_note().map(|note| note.recalled.clone()) {
-            self.writing.start(&self.settings.operator_inputs, &recalled);
+            self.writing.start(&self.layout.operator_inputs, &recalled);
         }
     }
 }

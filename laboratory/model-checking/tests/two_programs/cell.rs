@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Agreement, Conversion, FallbackChange, Mode, OnlineChange, Program, ProgramChange, Schedule,
-    Turns,
+    Agreement, Conversion, FallbackChange, Layout, Mode, OnlineChange, Program, ProgramChange,
+    Schedule, Turns,
 };
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
@@ -132,7 +132,7 @@ pub(crate) fn paired(wiring: Wiring) -> Parts {
     let mut parts = cell(&[program(false)], (1, 0), Turns::Token);
     for remote_io in &mut parts.remote_ios {
         remote_io.pair = Some(PairSettings { wiring, ..PairSettings::exclusive(1) });
-        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.layout.input_points);
     }
     parts
 }
@@ -144,9 +144,9 @@ pub(crate) fn sharing() -> Parts {
     for remote_io in &mut parts.remote_ios {
         let wiring = Wiring::Parallel { discrepancy_cycles: 2 };
         remote_io.pair = Some(PairSettings { wiring, ..PairSettings::exclusive(1) });
-        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.layout.input_points);
         let places = vec![PointPlace { bit: 0, of: Elementary::Usint }];
-        remote_io.output_points.clone_from(&places);
+        Arc::make_mut(&mut remote_io.layout).output_points.clone_from(&places);
         remote_io.shared_outputs = SharedOutputs { places, delay: 0 };
         remote_io.fallback.fail_safe = Image::zero(8);
     }
@@ -198,14 +198,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         program: ProgramId(index),
         agreement: Arc::clone(&agreement),
         hash: program.hash,
-        undriven: Image::zero(1),
-        input_points: understudy_remote_io::PointPlace::booleans(1),
-        output_points: understudy_remote_io::PointPlace::booleans(1),
-        operator_inputs: Vec::new(),
-        signals: Vec::new(),
-        signal_sources: Vec::new(),
-        channels: Vec::new(),
-        stop: None,
+        layout: Arc::new(Layout::booleans(1, 1)),
         diagnosis: None,
         fallback: fallback(),
         pair: None,
