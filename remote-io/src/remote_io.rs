@@ -28,6 +28,7 @@ mod forcing;
 mod identity;
 mod knowledge;
 mod pairing;
+mod points;
 mod protection;
 mod recovery;
 mod sampling;
@@ -44,8 +45,8 @@ use understudy_cycle::{
     Arrival, Descent, Input, Layout, Machine, Output, Outvoted, Participant, RemoteIoInput,
 };
 use understudy_wire::{
-    Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
-    ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
+    Body, Configurations, Frame, Header, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
+    ProgramHash, ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -59,6 +60,7 @@ use changing::Replacing;
 use forcing::Forcing;
 use knowledge::Knowledge;
 use pairing::Pairing;
+use points::Sensed;
 use protection::Protection;
 use signals::Signals;
 use warm::Noting;
@@ -70,6 +72,11 @@ pub struct RemoteIo {
     settings: Settings,
     /// Points of the program that takes the newest sample.
     layout: Arc<Layout>,
+    /// The version of the program whose points these are.
+    laid_out: ProgramHash,
+    sensed: Sensed,
+    /// The version of a state of a station whose points are not known here; said once.
+    unknown_points: Option<ProgramHash>,
     member: Participant<Event>,
     holders: Holders,
     knowledge: Knowledge,
@@ -213,7 +220,7 @@ impl RemoteIo {
             resumed: None,
             forcing: Forcing::default(),
             writing: Writing::new(&settings.layout.operator_inputs),
-            signals: Signals::new(&settings),
+            signals: Signals::of(&settings.layout),
             noting: Noting::default(),
             turns: vec![None; stations],
             deadline: Deadline::Passed { idle: 0 },
@@ -226,6 +233,9 @@ impl RemoteIo {
             differed: Vec::new(),
             replacing: Replacing::default(),
             layout: Arc::clone(&settings.layout),
+            laid_out: settings.hash,
+            sensed: Sensed::new(settings.hash, &settings.layout),
+            unknown_points: None,
             settings,
         };
         remote_io.member.wake_at(remote_io.next_wakeup());
@@ -281,7 +291,7 @@ impl RemoteIo {
         self.note_prepared(station, &frame.header);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
-                self.note(station, &turn.holdings, None, &turn.recalled, frame.header.alone);
+                self.note((station, &frame.header), &turn.holdings, None, &turn.recalled);
                 self.learn_program(&frame.header, &turn.holdings);
                 self.holders.hear_of(turn.heard);
                 if turn.relayed.iter().any(|one| one.program == self.settings.program) {
@@ -292,7 +302,7 @@ impl RemoteIo {
             }
             Body::Join(join) => {
                 let Join { holdings, retained, recalled, .. } = join;
-                self.note(station, holdings, Some(retained), recalled, frame.header.alone);
+                self.note((station, &frame.header), holdings, Some(retained), recalled);
                 self.note_sample_of(station, holdings, join.lacks);
             }
             _ => {}
@@ -301,11 +311,8 @@ impl RemoteIo {
 
     fn take(&mut self, now: Time, input: RemoteIoInput<'_>) {
         match input {
-            RemoteIoInput::Field(sensors) => {
-                if sensors.width() == self.layout.input_width() {
-                    self.sensors = Some(sensors.clone());
-                }
-            }
+            RemoteIoInput::Field(sensors) => self.take_sensors(sensors),
+            RemoteIoInput::Points(version) => self.is_read_by(version),
             RemoteIoInput::FieldLost => self.sensors = None,
             RemoteIoInput::Choose(choice) => self.choose(choice),
             RemoteIoInput::Release => self.release(),
@@ -347,22 +354,27 @@ impl RemoteIo {
     /// Takes what a station tells of its states; a turn does not tell which ones it has kept over a power failure.
     fn note(
         &mut self,
-        station: StationId,
+        (station, header): (StationId, &Header),
         holdings: &[Holding],
         retained: Option<&[Kept]>,
         recalled: &[Recalled],
-        alone: bool,
     ) {
         let program = self.settings.program;
         let own = Holding::of(holdings, program);
+        let own = own.map(|holding| Holding {
+            version: self.version_in(header, holding.version),
+            ..*holding
+        });
+        let own = own.as_ref();
         if let Some(retained) = retained {
             let retained = retained.iter().find(|kept| kept.holding.program == program);
             self.holders.note_retained(station, retained);
         }
-        let recalled = recalled.iter().find(|recalled| {
-            recalled.program == program && recalled.inputs.width() == self.layout.input_width()
-        });
-        self.holders.note(station, own, recalled, alone);
+        let recalled = recalled.iter().find(|recalled| recalled.program == program);
+        let recalled =
+            recalled.map(|recalled| (recalled, self.version_in(header, recalled.version)));
+        let recalled = recalled.filter(|(it, version)| self.has_width(&it.inputs, *version));
+        self.holders.note(station, own, recalled, header.alone);
         if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)
             && let Some(place) = run.history.place(holding.lineage)
         {

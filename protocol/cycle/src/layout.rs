@@ -57,6 +57,14 @@ impl Layout {
         self.undriven.width()
     }
 
+    /// u(i) before the first sample: the initial values of all inputs.
+    pub fn initial(&self) -> Image {
+        let mut inputs = self.undriven.clone();
+        self.operator_inputs.iter().for_each(|input| input.place.set(&mut inputs, input.initial));
+        self.signals.iter().for_each(|signal| signal.place.set(&mut inputs, signal.default));
+        inputs
+    }
+
     /// Bits of u(i) that do not come from the field.
     pub fn sourced_bits(&self) -> impl Iterator<Item = usize> + '_ {
         let operators = self.operator_inputs.iter().map(|input| input.place);

@@ -83,6 +83,11 @@ impl OperatorInput {
         }
     }
 
+    /// Whether values of both mean the same: orders that last, numbers, presses of a button, or values of another group.
+    pub fn is_of_kind(&self, other: &Self) -> bool {
+        std::mem::discriminant(&self.kind) == std::mem::discriminant(&other.kind)
+    }
+
     /// Bit of u(i) that is TRUE while a value of another group holds.
     pub fn valid(&self) -> Option<u16> {
         match self.kind {

@@ -180,6 +180,7 @@ impl Bench {
             lineage,
             stepped,
             digest: Digest(0),
+            version: None,
         };
         let held = match (happening, sample) {
             (OnHistory | ValueFault, Some(sample)) => {
@@ -202,6 +203,7 @@ impl Bench {
             writes: Default::default(),
             pulses: Default::default(),
             inputs: Image::zero(1),
+            version: None,
         };
         Body::Join(Join {
             wants: ProgramSet::EMPTY,

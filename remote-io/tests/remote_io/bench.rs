@@ -163,6 +163,7 @@ pub(crate) fn recalled_of(sample: &Sample, sampled: Moment) -> Recalled {
         writes: sample.writes.clone(),
         pulses: sample.pulses.clone(),
         inputs: sample.without_forces().expect("it has the inputs of its cycle").clone(),
+        version: None,
     }
 }
 
@@ -174,6 +175,7 @@ pub(crate) fn held_after(sample: &Sample, stepped: Moment) -> Holding {
         lineage: sample.after,
         stepped,
         digest: Digest(0),
+        version: None,
     }
 }
 

@@ -34,6 +34,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                 lineage: Lineage(lineage),
                 stepped: moment(stepped),
                 digest: Digest(0),
+                version: None,
             });
             let recalled = Recalled {
                 program: PROGRAM,
@@ -45,6 +46,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                 writes: Default::default(),
                 pulses: Default::default(),
                 inputs: Image::zero(2),
+                version: None,
             };
             said.extend(bench.receive(bench.start(), rank, false, join(holding, Some(recalled))));
         }

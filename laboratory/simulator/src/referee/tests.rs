@@ -451,8 +451,14 @@ fn a_program_is_judged_during_later_changes_of_others() {
         let [before, after] = [number, number + 1].map(ConfigurationHash);
         Arc::new(OnlineChange { before, after, programs, fallbacks: Vec::new() })
     };
-    let program =
-        ProgramChange { program: ProgramId(0), before, after, forward: way.clone(), back: way };
+    let program = ProgramChange {
+        program: ProgramId(0),
+        before,
+        after,
+        forward: way.clone(),
+        back: way,
+        points: None,
+    };
     referee.learn(&change(1, vec![program]));
     let mut lineage = Lineage::genesis(ProgramHash(5), moment(0));
     let mut sample = |cycle, change| {
