@@ -98,7 +98,7 @@ struct Held {
 impl Held {
     fn holding(&self, program: ProgramId) -> Holding {
         let State { lineage, stepped, digest, .. } = self.state;
-        Holding { program, born: self.born, lineage, stepped, digest }
+        Holding { program, born: self.born, lineage, stepped, digest, version: None }
     }
 }
 
@@ -196,6 +196,11 @@ impl Replica {
         self.held.as_ref().map(|held| held.holding(self.id))
     }
 
+    /// The version of the program whose state that is, where it tells the points.
+    pub(crate) fn version(&self, versions: Versions<'_>) -> Option<ProgramHash> {
+        versions.named(self.held.as_ref()?.state.program)
+    }
+
     /// Follows the sample of `moment`, a frame whose body is `sample`.
     pub(crate) fn follow(
         &mut self,
@@ -209,7 +214,7 @@ impl Replica {
         };
         let moment = frame.header.moment;
         if sample.history.len() > self.history
-            || sample.history[0].inputs.width() != versions.input_count()
+            || sample.history.iter().any(|step| !versions.has_inputs(step.inputs.width()))
         {
             return Followed::Lost;
         }
@@ -370,7 +375,7 @@ impl Replica {
     }
 
     /// # Errors
-    /// As [`Self::replay`].
+    /// As [`Self::replay`]; so it is with inputs that are not those of the program.
     fn step(
         &mut self,
         versions: Versions<'_>,
@@ -382,7 +387,8 @@ impl Replica {
             return Ok(());
         };
         let target = step.change.unwrap_or(held.state.program);
-        let program = versions.of(target).ok_or(target)?;
+        let takes = |program: &&Program| program.executable.input_count() == step.inputs.width();
+        let program = versions.of(target).filter(takes).ok_or(target)?;
         let converted = match target == held.state.program {
             true => None,
             false => Some(converted(versions, (&held.state, program), &step.inputs).ok_or(target)?),
@@ -407,6 +413,10 @@ impl Replica {
         self.step.program = target;
         self.step.state.clone_from(&held.state.bits);
         self.step.inputs.clone_from(&step.inputs);
+        let outputs = program.executable.output_count();
+        if self.step.outputs.width() != outputs {
+            self.step.outputs = Image::zero(outputs);
+        }
         program.executable.step(
             scratch,
             held.state.bits.words_mut(),

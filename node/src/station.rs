@@ -371,13 +371,17 @@ impl Station {
     fn hand_over_retained(&mut self, program: ProgramId) {
         if let Some(replica) = replica_mut(&mut self.replicas, program) {
             for record in replica.take_records() {
-                self.member.put(Output::Retain(record));
+                self.member.put(Output::Retain(Box::new(record)));
             }
         }
     }
 
     fn holdings(&self) -> SmallVec<[Holding; 2]> {
-        self.replicas.iter().filter_map(Replica::holding).collect()
+        let held = self.replicas.iter().filter_map(|replica| {
+            let versions = self.settings.versions(&self.member, replica.id());
+            Some(Holding { version: replica.version(versions), ..replica.holding()? })
+        });
+        held.collect()
     }
 
     /// What it recalls of the programs whose samples it has not received in this cycle.

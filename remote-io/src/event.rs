@@ -43,6 +43,22 @@ pub enum Event {
         /// Hash of the program after.
         to: ProgramHash,
     },
+    /// The points of another version of the program count from now on: for all that is reported of inputs and outputs after this.
+    PointsChanged {
+        /// Cycle.
+        moment: Moment,
+        /// Hash of the version before.
+        from: ProgramHash,
+        /// Hash of the version after.
+        to: ProgramHash,
+    },
+    /// A station holds a state of a version of the program whose points are not loaded here: nothing is sampled until they are.
+    PointsUnknown {
+        /// Cycle.
+        moment: Moment,
+        /// Hash of the version.
+        version: ProgramHash,
+    },
     /// A program fault has stopped the new program of an online change while it was on trial: the program before takes the next sample and all after it,
     /// with the values of before the scan of the fault.
     ChangeTakenBack {

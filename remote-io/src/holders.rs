@@ -6,7 +6,8 @@ use std::cmp::Reverse;
 
 use understudy_cycle::Agreement;
 use understudy_wire::{
-    Epoch, Holding, Kept, Moment, ProgramId, Recalled, SamplesReceived, StationId, StationSet,
+    Epoch, Holding, Kept, Moment, ProgramHash, ProgramId, Recalled, SamplesReceived, StationId,
+    StationSet,
 };
 
 /// One entry for each station that can hold the program's state.
@@ -70,13 +71,13 @@ impl Holders {
         }
     }
 
-    /// Takes the state that a station holds of this program, what it recalls of the last sample, and whether it is alone: it receives no other
-    /// member.
+    /// Takes the state that a station holds of this program, what it recalls of the last sample, with the version of the program where that is
+    /// known, and whether it is alone: it receives no other member.
     pub(crate) fn note(
         &mut self,
         station: StationId,
         holding: Option<&Holding>,
-        recalled: Option<&Recalled>,
+        recalled: Option<(&Recalled, Option<ProgramHash>)>,
         alone: bool,
     ) {
         if let Some(entry) = self.entries.iter_mut().find(|entry| entry.station == station) {
@@ -85,7 +86,8 @@ impl Holders {
                 entry.retained = None;
             }
             // A station that has restarted recalls nothing of its earlier life.
-            entry.recalled = recalled.cloned();
+            entry.recalled =
+                recalled.map(|(recalled, version)| Recalled { version, ..recalled.clone() });
             entry.silent = 0;
             if holding.is_some() || !alone {
                 entry.absent = 0;

@@ -28,6 +28,7 @@ mod forcing;
 mod identity;
 mod knowledge;
 mod pairing;
+mod points;
 mod protection;
 mod recovery;
 mod sampling;
@@ -41,11 +42,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Arrival, Descent, Input, Machine, Output, Outvoted, Participant, RemoteIoInput,
+    Arrival, Descent, Input, Layout, Machine, Output, Outvoted, Participant, RemoteIoInput,
 };
 use understudy_wire::{
-    Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
-    ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
+    Body, Configurations, Frame, Header, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
+    ProgramHash, ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -59,6 +60,7 @@ use changing::Replacing;
 use forcing::Forcing;
 use knowledge::Knowledge;
 use pairing::Pairing;
+use points::Sensed;
 use protection::Protection;
 use signals::Signals;
 use warm::Noting;
@@ -68,6 +70,13 @@ use writing::Writing;
 #[derive(Debug, Clone)]
 pub struct RemoteIo {
     settings: Settings,
+    /// Points of the program that takes the newest sample.
+    layout: Arc<Layout>,
+    /// The version of the program whose points these are.
+    laid_out: ProgramHash,
+    sensed: Sensed,
+    /// The version of a state of a station whose points are not known here; said once.
+    unknown_points: Option<ProgramHash>,
     member: Participant<Event>,
     holders: Holders,
     knowledge: Knowledge,
@@ -201,17 +210,17 @@ impl RemoteIo {
             knowledge: Knowledge::default(),
             question: None,
             authority: Authority::Proof,
-            sensors: settings.pair.is_none().then(|| settings.undriven.clone()),
-            field: settings.undriven.clone(),
+            sensors: settings.pair.is_none().then(|| settings.layout.undriven.clone()),
+            field: settings.layout.undriven.clone(),
             sampled_at: now,
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
-            diagnosed: Image::zero(settings.undriven.width()),
+            diagnosed: Image::zero(settings.layout.input_width()),
             looked: now,
             protection: Protection::default(),
             resumed: None,
             forcing: Forcing::default(),
-            writing: Writing::new(&settings.operator_inputs),
-            signals: Signals::new(&settings),
+            writing: Writing::new(&settings.layout.operator_inputs),
+            signals: Signals::of(&settings.layout),
             noting: Noting::default(),
             turns: vec![None; stations],
             deadline: Deadline::Passed { idle: 0 },
@@ -223,6 +232,10 @@ impl RemoteIo {
             trust: Trust::default(),
             differed: Vec::new(),
             replacing: Replacing::default(),
+            layout: Arc::clone(&settings.layout),
+            laid_out: settings.hash,
+            sensed: Sensed::new(settings.hash, &settings.layout),
+            unknown_points: None,
             settings,
         };
         remote_io.member.wake_at(remote_io.next_wakeup());
@@ -256,7 +269,7 @@ impl RemoteIo {
             // Samples of other programs start no cycle here: they only prove signals.
             (Member::RemoteIo(program) | Member::Twin(program), Body::Sample(sample)) => {
                 if self.member.admits(now, &frame.header) {
-                    let sources = &self.settings.signal_sources;
+                    let sources = &self.layout.signal_sources;
                     let moment = frame.header.moment;
                     self.signals.note(sources, program, moment, sample);
                 }
@@ -278,7 +291,7 @@ impl RemoteIo {
         self.note_prepared(station, &frame.header);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
-                self.note(station, &turn.holdings, None, &turn.recalled, frame.header.alone);
+                self.note((station, &frame.header), &turn.holdings, None, &turn.recalled);
                 self.learn_program(&frame.header, &turn.holdings);
                 self.holders.hear_of(turn.heard);
                 if turn.relayed.iter().any(|one| one.program == self.settings.program) {
@@ -289,7 +302,7 @@ impl RemoteIo {
             }
             Body::Join(join) => {
                 let Join { holdings, retained, recalled, .. } = join;
-                self.note(station, holdings, Some(retained), recalled, frame.header.alone);
+                self.note((station, &frame.header), holdings, Some(retained), recalled);
                 self.note_sample_of(station, holdings, join.lacks);
             }
             _ => {}
@@ -298,11 +311,8 @@ impl RemoteIo {
 
     fn take(&mut self, now: Time, input: RemoteIoInput<'_>) {
         match input {
-            RemoteIoInput::Field(sensors) => {
-                if sensors.width() == self.settings.undriven.width() {
-                    self.sensors = Some(sensors.clone());
-                }
-            }
+            RemoteIoInput::Field(sensors) => self.take_sensors(sensors),
+            RemoteIoInput::Points(version) => self.is_read_by(version),
             RemoteIoInput::FieldLost => self.sensors = None,
             RemoteIoInput::Choose(choice) => self.choose(choice),
             RemoteIoInput::Release => self.release(),
@@ -344,22 +354,27 @@ impl RemoteIo {
     /// Takes what a station tells of its states; a turn does not tell which ones it has kept over a power failure.
     fn note(
         &mut self,
-        station: StationId,
+        (station, header): (StationId, &Header),
         holdings: &[Holding],
         retained: Option<&[Kept]>,
         recalled: &[Recalled],
-        alone: bool,
     ) {
         let program = self.settings.program;
         let own = Holding::of(holdings, program);
+        let own = own.map(|holding| Holding {
+            version: self.version_in(header, holding.version),
+            ..*holding
+        });
+        let own = own.as_ref();
         if let Some(retained) = retained {
             let retained = retained.iter().find(|kept| kept.holding.program == program);
             self.holders.note_retained(station, retained);
         }
-        let recalled = recalled.iter().find(|recalled| {
-            recalled.program == program && recalled.inputs.width() == self.settings.undriven.width()
-        });
-        self.holders.note(station, own, recalled, alone);
+        let recalled = recalled.iter().find(|recalled| recalled.program == program);
+        let recalled =
+            recalled.map(|recalled| (recalled, self.version_in(header, recalled.version)));
+        let recalled = recalled.filter(|(it, version)| self.has_width(&it.inputs, *version));
+        self.holders.note(station, own, recalled, header.alone);
         if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)
             && let Some(place) = run.history.place(holding.lineage)
         {

@@ -244,6 +244,7 @@ mod tests {
             lineage,
             stepped: Moment::default(),
             digest: Digest(digest),
+            version: None,
         }
     }
 

@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::{Agreement, Fallback, PointPlace, SharedOutputs};
-use understudy_wire::{Image, ProgramHash, ProgramId};
+use understudy_cycle::{Agreement, Fallback, Layout, SharedOutputs};
+use understudy_wire::{ProgramHash, ProgramId};
 
-use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;
 use crate::paired_inputs::PairedInput;
-use crate::source::{OperatorInput, SignalInput, SignalSource};
 
 /// Configuration of one remote I/O.
 #[derive(Debug, Clone)]
@@ -19,22 +17,8 @@ pub struct Settings {
     pub agreement: Arc<Agreement>,
     /// Hash of the program's circuit.
     pub hash: ProgramHash,
-    /// u(i) where nothing drives it: the initial values of its variables.
-    pub undriven: Image,
-    /// Signals of u(i), in the order of their bits.
-    pub input_points: Vec<PointPlace>,
-    /// Signals of y(i), in the order of their bits.
-    pub output_points: Vec<PointPlace>,
-    /// Inputs that operators write; no two share a bit with each other or with a signal.
-    pub operator_inputs: Vec<OperatorInput>,
-    /// Inputs that are outputs of other programs.
-    pub signals: Vec<SignalInput>,
-    /// The programs that compute them, each once.
-    pub signal_sources: Vec<SignalSource>,
-    /// Inputs whose channels report their own failure.
-    pub channels: Vec<Channel>,
-    /// Where the program reports a program fault; `None` for a program that has none.
-    pub stop: Option<StopPoints>,
+    /// Points of the program.
+    pub layout: Arc<Layout>,
     /// Ladder that finds failed channels that do not report it.
     pub diagnosis: Option<Arc<Diagnosis>>,
     /// What it does where nothing is proved.
@@ -85,28 +69,4 @@ pub enum Wiring {
         /// Samples in a row in which two readings of an input differ until an operator is told: at least 1.
         discrepancy_cycles: u32,
     },
-}
-
-impl Settings {
-    /// Bits of u(i) that do not come from the field.
-    pub fn sourced_bits(&self) -> impl Iterator<Item = usize> + '_ {
-        let operators = self.operator_inputs.iter().map(|input| input.place);
-        let signals = self.signals.iter().map(|signal| signal.place);
-        let places = operators.chain(signals).flat_map(|place| {
-            let first = usize::from(place.bit);
-            first..first + place.of.bits() as usize
-        });
-        let of_groups = self.operator_inputs.iter().filter_map(|input| input.valid());
-        let valid = self.signals.iter().filter_map(|signal| signal.valid);
-        places.chain(valid.chain(of_groups).map(usize::from))
-    }
-}
-
-/// The points by which a program with numbers reports a program fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct StopPoints {
-    /// Bit of y(i): a fault has stopped the program.
-    pub stopped: usize,
-    /// Bit of u(i): the program starts again from its initial state.
-    pub reset: usize,
 }

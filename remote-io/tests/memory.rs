@@ -7,12 +7,13 @@
 mod bench;
 
 use std::alloc::System;
+use std::sync::Arc;
 
 use bench::{Bench, PERIOD, held_after, join, settings, turn};
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, Fallback, OperatorInput, OperatorInputKind, PointPlace, Settings,
+    Event, Fallback, Layout, OperatorInput, OperatorInputKind, PointPlace, Settings,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
@@ -41,11 +42,11 @@ fn with(width: u16) -> Settings {
         retains: false,
     };
     Settings {
-        undriven: Image::zero(bits),
+        layout: Arc::new(Layout {
+            operator_inputs: vec![operator_input],
+            ..Layout::booleans(width, width)
+        }),
         fallback: Fallback { fail_safe: Image::zero(bits), ..settings(1).fallback },
-        input_points: PointPlace::booleans(width),
-        output_points: PointPlace::booleans(width),
-        operator_inputs: vec![operator_input],
         ..settings(1)
     }
 }

@@ -87,6 +87,7 @@ impl Module {
                 writes: Default::default(),
                 pulses: Default::default(),
                 unforced: None,
+                version: None,
             }),
         });
         self.copies.sent(now, &frame, &self.agreement.schedule);

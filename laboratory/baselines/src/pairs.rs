@@ -233,6 +233,7 @@ impl Pairs {
                         | Output::Follow(_)
                         | Output::Connect(_)
                         | Output::EndWith(_)
+                        | Output::LayOut(_)
                         | Output::Answer(_)
                         | Output::Obeyed(_) => {}
                     }
@@ -256,6 +257,7 @@ impl Pairs {
                         | Output::Follow(_)
                         | Output::Connect(_)
                         | Output::EndWith(_)
+                        | Output::LayOut(_)
                         | Output::Answer(_)
                         | Output::Obeyed(_)
                         | Output::Retain(_) => {}

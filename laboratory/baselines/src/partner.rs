@@ -170,6 +170,7 @@ impl Partner {
                 lineage: Lineage::genesis(ProgramHash::default(), self.moment(0)),
                 stepped: self.moment(self.stepped),
                 digest: Digest::of(&self.state),
+                version: None
             }],
             words: smallvec![Word { mask: ProgramSet::only(program), sum: outputs }],
             recalled: Vec::new(),

@@ -40,7 +40,7 @@ impl Parts {
     /// Who receives what; plants are not on the network.
     pub(crate) fn roster(&self) -> Roster {
         let pairs = self.remote_ios.iter().flat_map(|reader| {
-            let sources = reader.signals.iter().map(|signal| signal.from);
+            let sources = reader.layout.signals.iter().map(|signal| signal.from);
             sources.map(|source| (Member::RemoteIo(source), Member::RemoteIo(reader.program)))
         });
         let paired = self.remote_ios.iter().filter(|settings| settings.pair.is_some());

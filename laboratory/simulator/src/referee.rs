@@ -23,6 +23,7 @@
 mod descent;
 mod fallbacks;
 mod pair;
+mod points;
 mod programs;
 mod steps;
 mod unrecorded;
@@ -40,6 +41,7 @@ use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, Source, S
 use descent::Descent;
 use fallbacks::Fallbacks;
 use pair::Pair;
+use points::Points;
 use programs::Programs;
 use unrecorded::Unrecorded;
 pub use violation::Violation;
@@ -70,6 +72,7 @@ pub struct Referee {
     /// h(x(t), u(t)) of the newest sample, with its cycle.
     truth: Option<(Moment, Image)>,
     last_true: Option<Image>,
+    points: Points,
     descent: Descent,
     held: u32,
     /// Records are missing, and no state after them is known yet.
@@ -123,13 +126,14 @@ impl Referee {
             newest: None,
             truth: None,
             last_true: None,
+            points: Points::new(settings.hash, &settings.layout),
             descent: Descent::default(),
             held: 0,
             blind: false,
             is_new: false,
             unjudged: None,
             gaps: 0,
-            unrecorded: Unrecorded::new(settings.sourced_bits()),
+            unrecorded: Unrecorded::new(settings.layout.sourced_bits()),
             pair: Pair::default(),
             choice: 0,
             cold_starts: 0,
@@ -185,6 +189,7 @@ impl Referee {
     /// The remote I/O starts again.
     pub fn starts_again(&mut self) {
         self.is_new = true;
+        self.points.is_new = true;
         self.fallbacks.starts_again();
     }
 

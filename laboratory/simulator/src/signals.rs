@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use understudy_remote_io::Settings;
+use understudy_remote_io::{Layout, Settings};
 use understudy_wire::{Image, Moment, ProgramId, ProgramSet};
 
 use crate::referee::Violation;
@@ -22,7 +22,7 @@ pub(crate) struct SignalReferee {
 
 impl SignalReferee {
     pub(crate) fn new(readers: &[Settings]) -> Self {
-        let signals = readers.iter().flat_map(|reader| &reader.signals);
+        let signals = readers.iter().flat_map(|reader| &reader.layout.signals);
         Self {
             read: signals.map(|signal| signal.from).collect(),
             truths: vec![VecDeque::new(); readers.len()],
@@ -49,11 +49,11 @@ impl SignalReferee {
     /// The first sampled signal that is not true.
     pub(crate) fn judge(
         &self,
-        settings: &Settings,
+        layout: &Layout,
         moment: Moment,
         inputs: &Image,
     ) -> Option<Violation> {
-        let mut signals = settings.signals.iter();
+        let mut signals = layout.signals.iter();
         let wrong = signals.find(|signal| {
             let value = signal.place.get(inputs);
             let truths = &self.truths[signal.from.index()];

@@ -443,11 +443,12 @@ impl Simulation {
                     }
                     observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
-                Output::Retain(record) => self.disks.write(member, record),
+                Output::Retain(record) => self.disks.write(member, *record),
                 Output::Drive { .. }
                 | Output::Follow(_)
                 | Output::Connect(_)
                 | Output::EndWith(_)
+                | Output::LayOut(_)
                 | Output::Answer(_)
                 | Output::Obeyed(_) => {}
             }
@@ -471,6 +472,14 @@ impl Simulation {
                 Output::Follow(outputs) => self.follow(member, program, &outputs, observe),
                 Output::Connect(true) => self.show_field(program),
                 Output::Connect(false) | Output::EndWith(_) => {}
+                // Its modules are wired for all points.
+                Output::LayOut(version) => {
+                    let now = self.now;
+                    let told = Input::RemoteIo(RemoteIoInput::Points(version));
+                    if let Some(slot) = self.remote_io_slot(member) {
+                        slot.give(now, told);
+                    }
+                }
                 Output::Report(event) => {
                     if let understudy_remote_io::Event::Configured(configurations) = event {
                         self.disks.configure(member, configurations);
@@ -479,7 +488,7 @@ impl Simulation {
                     self.show_spares(program, &event);
                     observe(self.now, self.pace.cycle(), member, Record::RemoteIo(&event));
                 }
-                Output::Retain(record) => self.disks.write(member, record),
+                Output::Retain(record) => self.disks.write(member, *record),
                 // The event says the same.
                 Output::Answer(_) | Output::Obeyed(_) => {}
             }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use proptest::prelude::*;
-use understudy_cluster::{ChangeTexts, Cluster, read};
+use understudy_cluster::{ChangeTexts, Cluster, change_with_points, read};
 use understudy_remote_io::Event;
 use understudy_simulator::{
     Action, ChangeStep, Fault, Network, Parts, Record, Simulation, Tally, Violation, parts,
 };
-use understudy_wire::{Image, Member, ProgramId, Source, StationId};
+use understudy_wire::{Image, Member, PointValue, ProgramId, Source, StationId};
 
 const CLUSTER: &str = r#"
 [cluster]
@@ -57,6 +57,34 @@ PROGRAM counter
   shown := count;
 END_PROGRAM";
 
+/// The same count with operator inputs, and points that all move in the new program: `go` and `step` have other bits, `more` and `alarm` are new, `done`
+/// goes.
+const FEW_POINTS: &str = "
+PROGRAM counter
+  VAR_INPUT go : BOOL; step : INT; END_VAR
+  VAR_OUTPUT shown : DINT; done : BOOL; END_VAR
+  VAR count : INT; END_VAR
+  count := count + step;
+  shown := count;
+  done := go;
+END_PROGRAM";
+const MORE_POINTS: &str = "
+PROGRAM counter
+  VAR_INPUT more : INT; step : INT; go : BOOL; END_VAR
+  VAR_OUTPUT alarm : LREAL; shown : DINT; END_VAR
+  VAR count : DINT; END_VAR
+  count := count + 10 * step + more;
+  shown := count;
+  IF go THEN alarm := 1.0; END_IF;
+END_PROGRAM";
+
+/// Keys of the remote I/O of the counter with these points.
+const FEW_KEYS: &str = "trial_cycles = 10\nfail_safe = { shown = 17, done = true }\n\
+    inputs = { go = { operator = \"level\" }, step = { operator = \"setpoint\", low = 0, high = 9, initial = 1 } }";
+const MORE_KEYS: &str = "trial_cycles = 10\nhold_cycles = 6\nfail_safe = { shown = 4711, alarm = 2.5 }\nramp = { shown = 1000, alarm = 1 }\n\
+    inputs = { more = { operator = \"setpoint\", low = 0, high = 9, initial = 5 }, step = { operator = \"setpoint\", low = 0, high = 8, initial = 1 }, \
+    go = { operator = \"level\" } }";
+
 const LAMP: &str = "
 PROGRAM lamp
   VAR_INPUT go : BOOL; END_VAR
@@ -94,9 +122,12 @@ fn read_cluster(counter: &str, text: &str) -> Cluster {
 
 /// As the new program, and stopped by a fault in its scan of this number, counted from 1.
 fn faulty(scan: u32) -> String {
-    let body =
-        format!("scans := scans + 1;\n  divided := 1 / ({scan} - scans);\n  count := count + 10;");
-    let text = AFTER.replace("count := count + 10;", &body);
+    stopped_in(scan, AFTER)
+}
+
+fn stopped_in(scan: u32, program: &str) -> String {
+    let body = format!("scans := scans + 1;\n  divided := 1 / ({scan} - scans);\n  count := ");
+    let text = program.replace("  count := ", &format!("  {body}"));
     text.replace("count : DINT;", "count : DINT; scans : INT; divided : INT;")
 }
 
@@ -113,6 +144,20 @@ fn changing_clusters(before: &Cluster, after: &Cluster) -> Parts {
     let texts = ChangeTexts::between(before, after).expect("an online change");
     let change = texts.load(before).expect("it is of this cluster");
     Parts { change: Some(Arc::new(change)), ..parts(before) }
+}
+
+/// A change of the points of the counter.
+fn changing_points() -> Parts {
+    changing_points_to(MORE_POINTS)
+}
+
+fn changing_points_to(after: &str) -> Parts {
+    let with = |counter: &str, keys: &str| {
+        read_cluster(counter, &CLUSTER.replace("trial_cycles = 10", keys))
+    };
+    let (before, after) = (with(FEW_POINTS, FEW_KEYS), with(after, MORE_KEYS));
+    let change = change_with_points(&before, &after).expect("an online change");
+    Parts { change: Some(Arc::new(change)), ..parts(&before) }
 }
 
 fn at(cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
@@ -155,6 +200,9 @@ struct Seen {
     configured: u32,
     cold_starts: u32,
     taken_back: u32,
+    points_changed: u32,
+    /// First bit of the count in the outputs that count.
+    shown_at: usize,
 }
 
 impl Seen {
@@ -163,9 +211,13 @@ impl Seen {
             Record::RemoteIo(Event::Applied { outputs, source, .. })
                 if member == Member::RemoteIo(COUNTER) =>
             {
-                self.counts.push((*source, count_in(outputs)));
+                self.counts.push((*source, count_in(outputs, self.shown_at)));
             }
             Record::RemoteIo(Event::ProgramChanged { .. }) => self.changes += 1,
+            Record::RemoteIo(Event::PointsChanged { .. }) => {
+                self.points_changed += 1;
+                self.shown_at = 64 - self.shown_at;
+            }
             Record::RemoteIo(Event::ChangeTakenBack { .. }) => self.taken_back += 1,
             Record::RemoteIo(Event::StartedCold { .. }) => self.cold_starts += 1,
             Record::Station(understudy_node::Event::NotPrepared { .. }) => self.not_prepared += 1,
@@ -176,8 +228,8 @@ impl Seen {
     }
 }
 
-fn count_in(outputs: &Image) -> i32 {
-    let bits = (0..32).map(|bit| i32::from(outputs.get(bit)) << bit);
+fn count_in(outputs: &Image, first: usize) -> i32 {
+    let bits = (0..32).map(|bit| i32::from(outputs.get(first + bit)) << bit);
     bits.fold(0, |count, bit| count | bit)
 }
 
@@ -217,6 +269,26 @@ fn a_program_changes_between_two_cycles() {
     assert!(steps[..change].iter().all(|step| *step == 1), "{steps:?}");
     assert!(steps[change..].iter().all(|step| *step == 10), "{steps:?}");
     assert!((36..44).contains(&change), "{change}");
+}
+
+/// All points move: those that stay take their values with them, and the outputs of the very cycle of the change are those of the new program. What an
+/// operator has written before stays, what is new begins with its initial value, and both can be written after. The way back goes the same way.
+#[test]
+fn points_change_between_two_cycles() {
+    let remote_io = Member::RemoteIo(COUNTER);
+    let write = |cycle, input, value: u64| {
+        at(cycle, 0.2, remote_io, Action::Write { input, value: PointValue::new(16, value) })
+    };
+    let mut faults = whole_change(20);
+    faults.retain(|fault| fault.at_cycle < 44);
+    // `step`, before and after; then `more`.
+    faults.extend([write(12, 16, 2), write(50, 16, 3), write(60, 0, 7)]);
+    faults.push(step(70, remote_io, ChangeStep::SwitchBack));
+    let (simulation, seen) = run_with(changing_points(), &faults, 100);
+    assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+    assert_eq!(misses(simulation.tallies()), 0);
+    assert_eq!((seen.changes, seen.points_changed, seen.not_prepared), (2, 2, 0));
+    assert_eq!(steps(&seen), [1, 2, 25, 35, 37, 3]);
 }
 
 /// Back before it is accepted, and after it.
@@ -357,6 +429,28 @@ fn a_program_fault_on_trial_takes_the_change_back() {
     }
 }
 
+/// So it is with other points, of which the reset and the fault are some that only the new program has: the points before count again too.
+#[test]
+fn a_program_fault_on_trial_takes_points_back() {
+    for scan in [1, 2, 10] {
+        let mut faults = whole_change(20);
+        faults.retain(|fault| fault.at_cycle < 60);
+        let is_given_once = |fault: &Fault| {
+            let is_switch = matches!(fault.action, Action::Change { step: ChangeStep::Switch });
+            !is_switch || fault.at_cycle <= 41
+        };
+        faults.retain(is_given_once);
+        let parts = changing_points_to(&stopped_in(scan, MORE_POINTS));
+        let (simulation, seen) = run_with(parts, &faults, 100);
+        assert!(simulation.violations().is_empty(), "{scan} {:?}", simulation.violations());
+        let found = (seen.changes, seen.points_changed, seen.taken_back);
+        assert_eq!(found, (2, 2, 1), "{scan}");
+        assert_eq!(misses(simulation.tallies()), 1, "{scan}");
+        let expected = if scan == 1 { &[1, 0, 1][..] } else { &[1, 15, 0, 1] };
+        assert_eq!(steps(&seen), expected, "{scan}");
+    }
+}
+
 /// After the trial, and of a program that a fault had stopped before the switch: the program stays stopped until the operator releases it.
 #[test]
 fn no_other_program_fault_takes_a_change_back() {
@@ -387,11 +481,12 @@ fn a_change_that_is_given_again_is_taken_back_again() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// One member at a time is killed, suspended or cut off, and comes back, at any phase of a change and of a change back.
+    /// One member at a time is killed, suspended or cut off, and comes back, at any phase of a change and of a change back, also of points.
     #[test]
     fn whatever_fails_during_a_change(
         begins in 20_u64..40,
         undone: bool,
+        of_points: bool,
         faults in prop::collection::vec((0..MEMBERS.len(), 0..3_usize, 1_u64..30, 0.0..1.0), 1..5),
     ) {
         let mut schedule = whole_change(begins);
@@ -420,7 +515,8 @@ proptest! {
             // It is synchronised again before the next one fails.
             cycle += lasts + 25;
         }
-        let (simulation, seen) = run(&schedule, 260);
+        let parts = if of_points { changing_points() } else { changing() };
+        let (simulation, seen) = run_with(parts, &schedule, 260);
         prop_assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
         prop_assert_eq!(seen.cold_starts, 0);
         if of_stations {
@@ -438,6 +534,7 @@ proptest! {
         ),
         seed: u64,
         faulty_scan in prop::option::of(1_u32..20),
+        writes in prop::option::of(prop::collection::vec((0_u64..120, 0_u16..48, 0_u64..9, prop::bool::ANY), 0..6)),
     ) {
         let mut schedule = Vec::new();
         for (cycle, place, kind) in steps {
@@ -481,7 +578,20 @@ proptest! {
                 _ => {}
             }
         }
-        let parts = faulty_scan.map_or_else(changing, |scan| changing_between(BEFORE, &faulty(scan)));
+        let parts = match (&writes, faulty_scan) {
+            // Of points, with writes and forces by chance.
+            (Some(_), _) => changing_points(),
+            (None, Some(scan)) => changing_between(BEFORE, &faulty(scan)),
+            (None, None) => changing(),
+        };
+        for (cycle, input, value, is_force) in writes.into_iter().flatten() {
+            let value = PointValue::new(16, value);
+            let write = match is_force {
+                true => Action::Set { input, value },
+                false => Action::Write { input, value },
+            };
+            schedule.push(at(cycle, 0.2, Member::RemoteIo(COUNTER), write));
+        }
         let mut simulation = Simulation::new(parts, Network::default(), seed);
         for fault in &schedule {
             simulation.schedule(*fault);

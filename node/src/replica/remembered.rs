@@ -29,7 +29,7 @@ impl Replica {
         let Some(inputs) = sample.without_forces() else {
             return;
         };
-        if inputs.width() == versions.input_count() {
+        if versions.has_inputs(inputs.width()) {
             if let Remembered::Received(known) = &mut self.remembered {
                 // A copy of it, or of one before it, says nothing of the stations that were received since.
                 if moment.epoch == known.sampled.epoch && moment <= known.sampled {
@@ -47,6 +47,7 @@ impl Replica {
                 known.writes.clone_from(&sample.writes);
                 known.pulses.clone_from(&sample.pulses);
                 known.inputs.clone_from(inputs);
+                known.version = sample.version;
                 return;
             }
             let recalled = Recalled {
@@ -59,6 +60,7 @@ impl Replica {
                 writes: sample.writes.clone(),
                 pulses: sample.pulses.clone(),
                 inputs: inputs.clone(),
+                version: sample.version,
             };
             self.remembered = Remembered::Received(recalled);
         }
@@ -126,9 +128,7 @@ impl Replica {
 
     /// Takes what another station remembers, where this one has received no sample.
     pub(crate) fn take_recalled(&mut self, versions: Versions<'_>, recalled: &Recalled) {
-        if self.remembered == Remembered::Nothing
-            && recalled.inputs.width() == versions.input_count()
-        {
+        if self.remembered == Remembered::Nothing && versions.has_inputs(recalled.inputs.width()) {
             let recalled = Recalled { received: SamplesReceived::Nothing, ..recalled.clone() };
             self.remembered = Remembered::Relayed(recalled);
         }

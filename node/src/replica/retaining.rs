@@ -101,10 +101,10 @@ impl Replica {
             return;
         };
         keeps.number = keeps.number.max(kept.number.saturating_add(1));
-        let inputs = versions.input_count();
         let Some(program) = versions.of(kept.hash) else {
             return;
         };
+        let inputs = program.executable.input_count();
         if kept.state.width() != program.executable.state_count()
             || run.steps.iter().any(|step| step.inputs.width() != inputs)
         {

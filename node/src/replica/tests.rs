@@ -117,6 +117,7 @@ impl Truth {
                 writes: Default::default(),
                 pulses: Default::default(),
                 unforced: None,
+                version: None,
             }),
         })
     }

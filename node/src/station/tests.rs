@@ -122,6 +122,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 writes: Default::default(),
                 pulses: Default::default(),
                 unforced: None,
+                version: None,
             };
             (Member::RemoteIo(ProgramId(program)), Body::Sample(sample))
         }
@@ -134,6 +135,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 lineage: lineage(rank, 1, cycle + 1),
                 stepped: moment(cycle),
                 digest: Digest::of(&state),
+                version: None,
             };
             let word =
                 Word { mask: ProgramSet::only(program), sum: Image::from_bits([!state.get(0)]) };

@@ -212,6 +212,8 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::Configured(_) => of("configured"),
         RemoteIo::ProgramChanged { .. } => of("program-changed"),
         RemoteIo::ChangeTakenBack { .. } => of("change-taken-back"),
+        RemoteIo::PointsChanged { .. } => of("points-changed"),
+        RemoteIo::PointsUnknown { .. } => of("points-unknown"),
         RemoteIo::Forced { force, .. } => about("forced", &force.signal),
         RemoteIo::Unforced { signal, .. } => return Some(Effect::Ends(about("forced", signal))),
         RemoteIo::SignalValidity { input, .. } => about("validity", input),
@@ -391,6 +393,7 @@ mod tests {
                 after: ConfigurationHash(after),
                 programs: Vec::new(),
                 fallbacks: Vec::new(),
+                points: Vec::new(),
             };
             let loaded = RunEvent::ChangeLoaded { texts: Box::new(texts) };
             in_effect.note(&Record::of_run(0, loaded), 0);

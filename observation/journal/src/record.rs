@@ -236,6 +236,8 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::ConfigurationDisputed { moment, .. }
             | RemoteIo::ProgramChanged { moment, .. }
             | RemoteIo::ChangeTakenBack { moment, .. }
+            | RemoteIo::PointsChanged { moment, .. }
+            | RemoteIo::PointsUnknown { moment, .. }
             | RemoteIo::PartChanged { moment, .. }
             | RemoteIo::PartnerLost { moment }
             | RemoteIo::PartnerReceived { moment }

@@ -194,6 +194,7 @@ fn turn(station: StationId, holds: ProgramSet, words: Vec<Word>) -> Arc<Frame> {
         lineage: lineage(program),
         stepped: Moment::default(),
         digest: Digest::default(),
+        version: None,
     });
     Arc::new(Frame {
         header: Header {

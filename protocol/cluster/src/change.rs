@@ -3,6 +3,7 @@
 mod error;
 mod fallback;
 mod plan;
+mod points;
 mod settings;
 mod unfit;
 
@@ -19,6 +20,7 @@ use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, Ret
 pub use self::error::ChangeError;
 pub use self::fallback::{ChangedFallback, FallbackText};
 pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_pairs, fates};
+pub use self::points::{ChangedPoints, FixedPoints, change_with_points};
 pub use self::settings::ChangedSetting;
 use self::settings::changed_settings;
 pub use self::unfit::{PairReason, Unfit};
@@ -103,6 +105,9 @@ pub struct ChangeTexts {
     /// What the remote I/Os do where nothing is proved, of each for which that changes, once, in the order of the cluster.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallbacks: Vec<ChangedFallback>,
+    /// The programs whose points change, each once, in the order of the cluster; their settings are in the sections.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<ChangedPoints>,
 }
 
 /// One program that changes.
@@ -209,6 +214,7 @@ impl ChangeTexts {
                 after: after.agreement().configuration,
                 programs,
                 fallbacks,
+                points: Vec::new(),
             })
         } else {
             Err(reasons)
@@ -234,14 +240,15 @@ impl ChangeTexts {
     /// The change back.
     #[must_use]
     pub fn back(self) -> Self {
-        let Self { cluster, before, after, programs, fallbacks } = self;
+        let Self { cluster, before, after, programs, fallbacks, points } = self;
         let programs = programs.into_iter().map(|changed| {
             let ChangedText { program, before, after } = changed;
             ChangedText { program, before: after, after: before }
         });
         let (programs, (before, after)) = (programs.collect(), (after, before));
         let fallbacks = fallbacks.into_iter().map(ChangedFallback::back).collect();
-        Self { cluster, before, after, programs, fallbacks }
+        let points = points.into_iter().map(ChangedPoints::back).collect();
+        Self { cluster, before, after, programs, fallbacks, points }
     }
 
     /// What a member loads, whose cluster file is `cluster`: that before the change, or that after it.
@@ -256,6 +263,9 @@ impl ChangeTexts {
         let own = agreement.configuration;
         if own != self.before && own != self.after {
             return Err(ChangeError::OtherConfiguration { own, before: self.before });
+        }
+        if !self.points.is_empty() {
+            return self.load_with_points(cluster);
         }
         let (mut programs, mut codes) = (Vec::new(), Vec::new());
         for changed in &self.programs {
@@ -291,6 +301,7 @@ impl ChangeTexts {
                 after: program(&after, &changed.after),
                 forward: Arc::new(Between::new(&before, &after)),
                 back: Arc::new(Between::new(&after, &before)),
+                points: None,
             });
         }
         let fallbacks = self.load_fallbacks(cluster)?;
@@ -368,6 +379,10 @@ impl Cluster {
             let unread = || ChangeError::NoSettings { program: controller.name.clone() };
             cluster.remote_ios.get_mut(place).ok_or_else(missing)?.fallback =
                 fallback.ok_or_else(unread)?;
+        }
+        for changed in &texts.points {
+            let section = if to == texts.after { &changed.after } else { &changed.before };
+            cluster.take_points(changed.program, section)?;
         }
         // It was generated from the programs of the file.
         cluster.parity = cluster.parity.filter(|_| !is_changed);

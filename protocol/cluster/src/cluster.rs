@@ -144,6 +144,8 @@ pub struct RemoteIo {
     pub name: String,
     /// What it does where nothing is proved.
     pub fallback: Fallback,
+    /// Its section of the cluster file, from which it is read again; one of its own where the file has none.
+    pub(crate) section: String,
     /// Its inputs that do not come from the field.
     pub inputs: Vec<InputSource>,
     /// The equipment behind it; without one its plant is simulated, or absent.

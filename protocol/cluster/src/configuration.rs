@@ -75,7 +75,7 @@ pub(crate) fn configuration_text(
             }
         }
         for source in &remote_io.inputs {
-            line(format_args!("  input {}", source_text(source)));
+            line(format_args!("{}", input_line(source)));
         }
         if let Some(diagnosis) = &remote_io.diagnosis {
             line(format_args!("diagnosis"));
@@ -149,6 +149,14 @@ pub(crate) fn filled(
         _ => line.to_owned() + "\n",
     });
     lines.collect()
+}
+
+/// Beginning of the line of an input.
+pub(crate) const INPUT: &str = "  input ";
+
+/// The line of an input.
+pub(crate) fn input_line(source: &InputSource) -> String {
+    format!("{INPUT}{}", source_text(source))
 }
 
 /// Source of an input; texts for people are not in it.

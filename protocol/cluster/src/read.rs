@@ -130,10 +130,30 @@ pub fn read_with(
         file::read(text, &mut diagnostics)
     };
     let cluster = file.and_then(|file| build(file, overrides, &mut ladders, &mut diagnostics));
+    let cluster = cluster.map(|cluster| with_sections(cluster, text));
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
     let mut reports = vec![Report { name: name.to_owned(), text: text.to_owned(), diagnostics }];
     reports.extend(ladders.into_reports());
     Loaded { cluster: cluster.filter(|_| !reports.iter().any(Report::has_errors)), reports }
+}
+
+/// A cluster with the sections of its remote I/Os, from the text of its file.
+fn with_sections(mut cluster: Cluster, text: &str) -> Cluster {
+    let document: toml::Table = text.parse().unwrap_or_default();
+    let sections = document.get("remote_io").and_then(toml::Value::as_array);
+    for (controller, remote_io) in cluster.controllers.iter().zip(&mut cluster.remote_ios) {
+        let name = toml::Value::from(controller.name.as_str());
+        let is_its = |section: &&toml::Value| section.get("controller") == Some(&name);
+        let section = sections.and_then(|sections| sections.iter().find(is_its)).cloned();
+        let section = section.unwrap_or_else(|| {
+            let of = ("controller".to_owned(), name.clone());
+            toml::Value::Table([of].into_iter().collect())
+        });
+        let document = ("remote_io".to_owned(), toml::Value::Array(vec![section]));
+        let document: toml::Table = [document].into_iter().collect();
+        remote_io.section = document.to_string();
+    }
+    cluster
 }
 
 /// A controller that was read as far as possible.
@@ -384,6 +404,7 @@ fn remote_ios(
                 stale_state: [StaleState::Operator, StaleState::Cold][section.stale_state],
                 restart: Some([Restart::Warm, Restart::Cold, Restart::Operator][section.restart]),
             },
+            section: String::new(),
             inputs: inputs::resolve(
                 &section.inputs,
                 index,
@@ -431,6 +452,7 @@ fn remote_ios(
                     stale_state: StaleState::default(),
                     restart: Some(Restart::default()),
                 },
+                section: String::new(),
                 inputs: Vec::new(),
                 field: None,
                 diagnosis: None,

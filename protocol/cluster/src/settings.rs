@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use understudy_cycle::Mode;
-use understudy_remote_io::{PairSettings, PointPlace, SharedOutputs, SignalSource};
+use understudy_remote_io::{
+    Channel, Layout, PairSettings, PointPlace, SharedOutputs, SignalSource,
+};
 use understudy_wire::{Image, Member, Moment, ProgramId, StationId};
 
 use crate::cluster::{Cluster, RemoteIo, Twin};
@@ -50,16 +52,7 @@ impl Cluster {
             program,
             agreement: Arc::clone(&self.agreement),
             hash: controller.hash,
-            undriven: initial_image(&controller.interface.inputs),
-            input_points: controller.interface.inputs.iter().map(PointPlace::of).collect(),
-            output_points: controller.interface.outputs.iter().map(PointPlace::of).collect(),
-            operator_inputs: remote_io.operator_inputs().map(|it| it.input).collect(),
-            signals: remote_io.signals().map(|signal| signal.input).collect(),
-            signal_sources: self.signal_sources(remote_io),
-            channels: understudy_remote_io::Channel::of_inputs(
-                &controller.interface.inputs.bit_names(),
-            ),
-            stop: controller.stop_points(),
+            layout: Arc::new(self.layout(program)?),
             diagnosis: remote_io.diagnosis.as_ref().map(|it| Arc::clone(&it.compiled)),
             fallback: remote_io.fallback.clone(),
             pair: remote_io.twin.as_ref().map(|twin| PairSettings {
@@ -71,6 +64,23 @@ impl Cluster {
                 .as_ref()
                 .map_or_else(Vec::new, |twin| twin.paired_inputs.clone()),
             shared_outputs: self.shared_outputs(program, remote_io),
+        })
+    }
+
+    /// The points of a program; nothing where the cluster has no such program.
+    pub fn layout(&self, program: ProgramId) -> Option<Layout> {
+        let remote_io = self.remote_ios.get(program.index())?;
+        let controller = self.controllers.get(program.index())?;
+        let (inputs, outputs) = (&controller.interface.inputs, &controller.interface.outputs);
+        Some(Layout {
+            undriven: initial_image(inputs),
+            input_points: inputs.iter().map(PointPlace::of).collect(),
+            output_points: outputs.iter().map(PointPlace::of).collect(),
+            operator_inputs: remote_io.operator_inputs().map(|it| it.input).collect(),
+            signals: remote_io.signals().map(|signal| signal.input).collect(),
+            signal_sources: self.signal_sources(remote_io),
+            channels: Channel::of_inputs(&inputs.bit_names()),
+            stop: controller.stop_points(),
         })
     }
 

@@ -20,6 +20,8 @@ use understudy_wire::{
 };
 
 use crate::fallback::Fallback;
+use crate::layout::Layout;
+use crate::passage::{Passage, PointsChange};
 
 /// Compiled program of the cluster.
 #[derive(Debug, Clone)]
@@ -45,7 +47,7 @@ pub trait Conversion: Debug + Send + Sync {
 pub struct ProgramChange {
     /// Which program.
     pub program: ProgramId,
-    /// The program of the configuration before; its points are those of `after`.
+    /// The program of the configuration before.
     pub before: Program,
     /// The program of the configuration after.
     pub after: Program,
@@ -53,6 +55,20 @@ pub struct ProgramChange {
     pub forward: Arc<dyn Conversion>,
     /// From a state of `after` to one of `before`.
     pub back: Arc<dyn Conversion>,
+    /// What becomes of its points; `None` where both programs have the same ones. The change has the settings of its remote I/O too then.
+    pub points: Option<Arc<PointsChange>>,
+}
+
+impl ProgramChange {
+    /// The way of the points from one of the two programs to the other one; nothing where they stay.
+    fn passage(&self, from: ProgramHash, to: ProgramHash) -> Option<Passage<'_>> {
+        let points = self.points.as_ref()?;
+        match (self.before.hash, self.after.hash) {
+            hashes if hashes == (from, to) => Some(points.forward()),
+            hashes if hashes == (to, from) => Some(points.back()),
+            _ => None,
+        }
+    }
 }
 
 /// What an online change replaces of the settings of one remote I/O. They count where that configuration is its own.
@@ -100,6 +116,42 @@ impl OnlineChange {
         Some(if configuration == self.after { &of.after } else { &of.before })
     }
 
+    /// The way of the points of a program from one of its versions to another one; nothing where they stay.
+    pub fn passage(
+        &self,
+        program: ProgramId,
+        (from, to): (ProgramHash, ProgramHash),
+    ) -> Option<Passage<'_>> {
+        self.of(program)?.passage(from, to)
+    }
+
+    /// The layout of a version of a program; nothing where the change does not replace its points, or the version is none of the two.
+    pub fn layout(&self, program: ProgramId, version: ProgramHash) -> Option<&Arc<Layout>> {
+        let changed = self.of(program)?;
+        let points = changed.points.as_ref()?;
+        match version {
+            _ if version == changed.before.hash => Some(&points.before),
+            _ if version == changed.after.hash => Some(&points.after),
+            _ => None,
+        }
+    }
+
+    /// Settings of a remote I/O, those of the configuration `of`, for the points of the version of its program that runs.
+    pub fn fitted(
+        &self,
+        (own, of): (&Fallback, ConfigurationHash),
+        program: ProgramId,
+        running: ProgramHash,
+    ) -> Fallback {
+        let other = if of == self.after { self.before } else { self.after };
+        let native = self.program_in(of, program).map(|program| program.hash);
+        let passage = native.and_then(|native| self.passage(program, (native, running)));
+        match (passage, self.fallback_in(other, program)) {
+            (Some(passage), Some(theirs)) => passage.fallback(own, theirs),
+            _ => own.clone(),
+        }
+    }
+
     /// The settings of a remote I/O in one of the two configurations; none where the change does not replace them.
     pub fn fallback_in(
         &self,
@@ -142,9 +194,14 @@ impl<'a> Versions<'a> {
         self.all().find(|program| program.hash == hash)
     }
 
-    /// Width of u in bits, which a change does not touch.
-    pub fn input_count(self) -> usize {
-        self.first.executable.input_count()
+    /// Whether u of one of them has this width in bits.
+    pub fn has_inputs(self, width: usize) -> bool {
+        self.all().any(|program| program.executable.input_count() == width)
+    }
+
+    /// The program with this hash, where a change replaces its points: the hash tells what its inputs are.
+    pub fn named(self, hash: ProgramHash) -> Option<ProgramHash> {
+        self.change.and_then(|change| change.points.as_ref()).map(|_| hash)
     }
 
     /// The first state of `to`, at a sample with these inputs, for the state of `from`; none where one of them is not loaded.

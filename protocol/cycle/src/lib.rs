@@ -8,16 +8,20 @@
 mod agreement;
 mod attendance;
 mod change;
+mod channel;
 mod clock;
 mod copies;
 mod fallback;
+mod layout;
 mod machine;
 mod participant;
+mod passage;
 mod place;
 mod ramp;
 mod reception;
 mod schedule;
 mod shared;
+mod source;
 pub mod spare;
 mod waking;
 
@@ -27,12 +31,16 @@ pub use change::{
     ChangeOrder, Changing, Conversion, FallbackChange, OnlineChange, Program, ProgramChange,
     Versions,
 };
+pub use channel::Channel;
 pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
 pub use fallback::{Fallback, Release, Restart, StaleState, ValueFault};
+pub use layout::{Layout, StopPoints};
 pub use machine::{Input, Machine, Output, Outvoted, RemoteIoInput};
 pub use participant::{Endpoint, Notice, Participant, Refusal};
+pub use passage::{Moved, Passage, PointsChange};
 pub use place::{PointPlace, in_order};
 pub use ramp::{Descent, Ramp};
 pub use schedule::{Schedule, ScheduleError, Turns};
 pub use shared::SharedOutputs;
+pub use source::{OperatorInput, OperatorInputKind, SignalInput, SignalSource, ValueMismatch};

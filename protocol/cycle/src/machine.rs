@@ -10,8 +10,8 @@ use std::time::Duration;
 use crate::change::ChangeOrder;
 
 use understudy_wire::{
-    ConfigurationHash, Configurations, Force, Frame, Image, OrderRefusal, Retained, SignalPlace,
-    StateChoice, Time, Write, WriteAnswer,
+    ConfigurationHash, Configurations, Force, Frame, Image, OrderRefusal, ProgramHash, Retained,
+    SignalPlace, StateChoice, Time, Write, WriteAnswer,
 };
 
 /// An input of a member.
@@ -32,6 +32,8 @@ pub enum Input<'a> {
 pub enum RemoteIoInput<'a> {
     /// Current values of its sensors.
     Field(&'a Image),
+    /// From here on the device is read by the points of this version of the program, as [`Output::LayOut`] asks.
+    Points(ProgramHash),
     /// The values of its sensors are not known.
     FieldLost,
     /// The operator releases the outputs of a program that was started cold.
@@ -61,6 +63,9 @@ pub enum Output<Event> {
     /// Outputs that the modules of a remote I/O drive next to those of the author, which drives the same: what the author has sent, or 0 where they are
     /// released.
     Follow(Image),
+    /// The points of this version of the program count from now on: the device is read and driven by them, and outputs that only the version before has
+    /// get their fail-safe values.
+    LayOut(ProgramHash),
     /// Whether the remote I/O is to be connected to its field; one that has no second one is from its start on.
     Connect(bool),
     /// Outputs that the device of a remote I/O is left with where the process ends in order; until the first of these, those that it was started with.
@@ -68,7 +73,7 @@ pub enum Output<Event> {
     /// An event for the journal.
     Report(Event),
     /// A record for the disk, for the time after a power failure.
-    Retain(Retained),
+    Retain(Box<Retained>),
     /// The answer to a write.
     Answer(WriteAnswer),
     /// What became of the release, the choice, the force, the end of a force or the step of an online change that was given last; once for each.

@@ -27,6 +27,7 @@ fn turn() -> (Frame, Vec<u8>) {
         lineage: Lineage(u64::MAX),
         stepped: moment,
         digest: Digest(u64::MAX),
+        version: None,
     };
     let word = Word {
         mask: ProgramSet::only(ProgramId(0)),

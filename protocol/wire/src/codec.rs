@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 13
+//!      4     1  version of this layout, 14
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -24,7 +24,7 @@ use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 13;
+const VERSION: u8 = 14;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -204,12 +204,15 @@ fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
     }
     kept_writes(&sample.writes)?;
     kept_pulses(&sample.pulses)?;
-    let width = sample.history[0].inputs.width();
-    let inputs = sample.history.iter().map(|step| &step.inputs);
-    if inputs.chain(&sample.unforced).all(|image| image.width() == width) {
+    // A change mark may bring other points.
+    let steps = sample.history.iter().zip(&sample.history[1..]);
+    let mut steps = steps.filter(|(_, next)| next.change.is_none());
+    let is_even = steps.all(|(step, next)| step.inputs.width() == next.inputs.width());
+    let newest = sample.history[sample.history.len() - 1].inputs.width();
+    if is_even && sample.unforced.iter().all(|image| image.width() == newest) {
         Ok(())
     } else {
-        Err(FrameError::Promise("all samples of a program are of one width"))
+        Err(FrameError::Promise("all samples from one change mark to the next are of one width"))
     }
 }
 

@@ -132,6 +132,9 @@ pub struct Sample {
     pub pulses: SmallVec<[Pulse; 1]>,
     /// u(i)(t) as it would be without the forces of operators; `None` where no force changes it.
     pub unforced: Option<Image>,
+    /// Version of the program that takes u(i)(t), where an online change that the sender has loaded replaces its points: it tells what each bit of the
+    /// inputs and the outputs is. `None` where they have one layout in all configurations that the sender has loaded, and where the remote I/O does not know it.
+    pub version: Option<ProgramHash>,
 }
 
 impl Sample {
@@ -216,6 +219,9 @@ pub struct Holding {
     pub stepped: Moment,
     /// Digest of the state *before* that step, x(i)(t): the state that the words of this turn were computed from.
     pub digest: Digest,
+    /// Version of the program whose state it is, where an online change that the sender has loaded replaces its points: it tells what each bit of the
+    /// inputs and the outputs is. `None` where they have one layout in all configurations that the sender has loaded.
+    pub version: Option<ProgramHash>,
 }
 
 impl Holding {
@@ -304,6 +310,8 @@ pub struct Recalled {
     /// u(i) without the forces of operators, with the channels that were failed and the values that they kept, and the values that operators
     /// wrote.
     pub inputs: Image,
+    /// As in the [`Sample`].
+    pub version: Option<ProgramHash>,
 }
 
 /// Samples of a program that a station has received since it started: what they tell of the outputs that it may have proved.

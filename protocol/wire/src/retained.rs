@@ -32,7 +32,7 @@ const MAXIMUM_RECORD_BYTES: usize = MAXIMUM_KEPT_TEXT_BYTES + 4096;
 const _: () = assert!(MAXIMUM_STATE_BITS / 64 * 9 + 4096 <= MAXIMUM_RECORD_BYTES);
 
 /// Version of the records.
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
 
 type Layout = Configuration<LittleEndian, Varint, Limit<MAXIMUM_RECORD_BYTES>>;
 

@@ -39,6 +39,7 @@ fn holding(program: u8) -> Holding {
         lineage: Lineage(0x0102_0304_0506_0708),
         stepped: moment(3, 4),
         digest: Digest(9),
+        version: None,
     }
 }
 
@@ -61,6 +62,7 @@ fn recalled(program: u8) -> Recalled {
         writes: smallvec![write(7, 1)],
         pulses: smallvec![pulse(2, 40)],
         inputs: image(4, 0b1010),
+        version: None,
     }
 }
 
@@ -85,6 +87,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         writes: smallvec![write(7, 1), write(9, 4)],
         pulses: smallvec![pulse(2, 41)],
         unforced: Some(image(4, 0b1000)),
+        version: Some(ProgramHash(11)),
     };
     let relayed = Relayed { program: ProgramId(1), sample: sample.clone() };
     let turn = Turn {
@@ -207,6 +210,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         writes: smallvec![],
         pulses: smallvec![],
         unforced: None,
+        version: None,
     };
     check_refused(remote_io, Body::Sample(empty.clone()));
     for writes in
@@ -235,6 +239,15 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         ..empty.clone()
     };
     check_refused(remote_io, Body::Sample(uneven));
+    // A change mark may bring other points; what is not forced is of the newest ones.
+    let change = Some(ProgramHash(7));
+    let history = smallvec![Step::of(image(1, 0)), Step { change, inputs: image(2, 0) }];
+    let changed = Sample { history, unforced: Some(image(2, 1)), ..empty.clone() };
+    let sent = frame(remote_io, Body::Sample(changed.clone()));
+    let mut bytes = Vec::new();
+    encode(&sent, &mut bytes).expect("it keeps its promises");
+    assert_eq!(decode(&bytes), Ok(sent));
+    check_refused(remote_io, Body::Sample(Sample { unforced: Some(image(1, 1)), ..changed }));
     let history = smallvec![Step::of(image(1, 0))];
     let uneven = Sample { history, unforced: Some(image(2, 0)), ..empty.clone() };
     check_refused(remote_io, Body::Sample(uneven));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::{ChangeOrder, Descent, OnlineChange, Output};
+use understudy_cycle::{ChangeOrder, Descent, Fallback, OnlineChange, Output};
 use understudy_wire::{
     ChangeName, ConfigurationHash, Configurations, Header, Holding, OrderRefusal, ProgramHash,
     Source, StationId, StationSet, Time,
@@ -82,6 +82,9 @@ impl RemoteIo {
         let restored = self.member.restore_change(Arc::clone(change), configurations);
         if restored.is_ok() {
             self.take_fallback(change, configurations.own);
+            if let Some(program) = change.program_in(configurations.own, self.settings.program) {
+                self.lay_out_by(change, program.hash);
+            }
             if configurations.prepared.is_none() {
                 self.adopt(change, configurations.own);
             }
@@ -165,6 +168,9 @@ impl RemoteIo {
             self.take_fallback(&change, own);
         }
         if let (Some(change), true) = (before, is_over) {
+            if let Some(program) = change.program_in(own, self.settings.program) {
+                self.lay_out_by(&change, program.hash);
+            }
             self.adopt(&change, own);
             self.replacing = Replacing::default();
         }
@@ -206,7 +212,7 @@ impl RemoteIo {
     /// Whether a program that a change mark brings is on trial. What the program of its own configuration does is no matter of the change.
     fn is_tried(&self, program: ProgramHash) -> bool {
         program != self.hash()
-            && self.settings.stop.is_some()
+            && self.layout_of(program).is_some_and(|layout| layout.stop.is_some())
             && self.settings.fallback.trial_cycles > 0
     }
 
@@ -259,21 +265,28 @@ impl RemoteIo {
     /// Takes the settings of its own configuration, one of those of a change. Outputs that are fail-safe go on from where they are: along the new
     /// ramps, to the new values.
     fn take_fallback(&mut self, change: &OnlineChange, own: ConfigurationHash) {
-        let changed = change.fallback_in(own, self.settings.program);
-        let Some(fallback) = changed.filter(|changed| **changed != self.settings.fallback) else {
+        let program = self.settings.program;
+        if let Some(changed) = change.fallback_in(own, program) {
+            self.take_settings(change.fitted((changed, own), program, self.laid_out));
+        }
+    }
+
+    /// Takes settings for the points that count.
+    pub(super) fn take_settings(&mut self, fallback: Fallback) {
+        if fallback == self.settings.fallback {
             return;
-        };
+        }
         let applied = self.applied.as_ref().filter(|it| it.source == Source::FailSafe);
         if let Some(applied) = applied.filter(|_| !fallback.ramps.is_empty()) {
             self.descent = Some(Descent::new(applied.outputs.clone()));
         } else {
             self.descent = None;
         }
-        self.settings.fallback = fallback.clone();
         // Modules next to those of the other one are released at the end.
         if !self.has_own_modules() {
             self.member.put(Output::EndWith(fallback.fail_safe.clone()));
         }
+        self.settings.fallback = fallback;
     }
 
     /// Whether the history may change to a program: no station that computes it now would be silent from then on.

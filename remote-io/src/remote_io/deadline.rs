@@ -92,7 +92,7 @@ impl RemoteIo {
     /// Outputs that the stations have proved and that a stopped program gives: they are those before its fault, and only held as such.
     fn unless_stopped(&mut self, selection: Selection) -> Selection {
         let (Some(stop), Selection::Direct(outputs) | Selection::Reconstructed(outputs, _)) =
-            (self.settings.stop, &selection)
+            (self.layout.stop, &selection)
         else {
             return selection;
         };
@@ -187,7 +187,7 @@ impl RemoteIo {
         }
         self.applied = Some(Applied { source, outputs: outputs.clone(), missing });
         let mut driven = self.forcing.outputs(&outputs);
-        if let Some(stop) = self.settings.stop {
+        if let Some(stop) = self.layout.stop {
             driven.set(stop.stopped, self.program != Execution::Running);
         }
         let outputs_of_modules = self.divide(&driven);

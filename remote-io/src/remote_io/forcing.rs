@@ -97,8 +97,8 @@ impl RemoteIo {
             return Some(OrderRefusal::Incomplete);
         }
         let points = match force.signal {
-            SignalPlace::Input(_) => &self.settings.input_points,
-            SignalPlace::Output(_) => &self.settings.output_points,
+            SignalPlace::Input(_) => &self.layout.input_points,
+            SignalPlace::Output(_) => &self.layout.output_points,
         };
         let Some(point) = points.iter().find(|point| point.bit == force.signal.first_bit()) else {
             return Some(OrderRefusal::NoSignal);

@@ -9,6 +9,11 @@ impl Hash for RemoteIo {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {
             settings: _,
+            // That of `laid_out`, which counts where an online change replaces the points.
+            layout: _,
+            laid_out,
+            sensed: _,
+            unknown_points,
             member,
             holders,
             knowledge,
@@ -44,6 +49,6 @@ impl Hash for RemoteIo {
         (writing, signals, noting, pairing).hash(hasher);
         (looked, resumed, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, descent, program, trust, differed).hash(hasher);
-        replacing.hash(hasher);
+        (replacing, self.named(Some(*laid_out)), unknown_points).hash(hasher);
     }
 }

@@ -339,9 +339,9 @@ impl RemoteIo {
         self.question = None;
         self.protection = Protection::default();
         self.diagnosing = Diagnosing::new(self.settings.diagnosis.as_deref());
-        let void = self.writing.lose(&self.settings.operator_inputs, moment, |_| true);
+        let void = self.writing.lose(&self.layout.operator_inputs, moment, |_| true);
         self.report_void(&void);
-        self.writing = Writing::new(&self.settings.operator_inputs);
+        self.writing = Writing::new(&self.layout.operator_inputs);
         self.end_all_forces();
         self.missed = 0;
         self.applied = None;

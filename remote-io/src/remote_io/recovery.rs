@@ -93,6 +93,12 @@ impl RemoteIo {
             }
             _ => missing.is_empty(),
         };
+        let unknown = self.holders.holdings().find(|(_, holding)| !self.can_read(holding));
+        let unknown = unknown.and_then(|(_, holding)| holding.version);
+        self.miss_points(unknown);
+        if unknown.is_some() {
+            return;
+        }
         // A missing station that could hold the state gets longer: it may be the only one that does.
         let patience = if is_whole { 1 } else { 5 };
         if waited < listen_cycles * patience || !self.may_begin(moment) || !self.is_sensed() {
@@ -226,6 +232,9 @@ impl RemoteIo {
                 StateChoice::Cold,
                 _,
             ) => self.start_cold(moment, None),
+            (Some(_), StateChoice::Newest { .. }, Some((_, newest))) if !self.can_read(&newest) => {
+                return self.refuse_choice(OrderRefusal::NotPrepared);
+            }
             (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
                 if cycle.is_none_or(|cycle| cycle == newest.stepped.cycle) =>
             {
@@ -270,8 +279,8 @@ impl RemoteIo {
         }
         // With the samples that the other one has sent, a station that lacks some of them follows at once.
         let known = sent.and_then(|sample| History::received(sample, lineage, capacity));
-        let history =
-            known.unwrap_or_else(|| History::from(holding.born, (None, lineage), capacity));
+        let history = known
+            .unwrap_or_else(|| History::from(holding.born, (holding.version, lineage), capacity));
         self.sample_from(moment, history, Some((from, holding)));
     }
 
@@ -303,11 +312,12 @@ impl RemoteIo {
         state: Option<(StationId, Holding)>,
     ) {
         self.become_author(moment);
+        self.lay_out(history.program().unwrap_or(self.hash()));
         self.protection.starts(state.is_none());
         if self.knowledge.floor().is_none() {
             self.remember(moment, state);
         }
-        let void = self.writing.lose(&self.settings.operator_inputs, moment, |_| true);
+        let void = self.writing.lose(&self.layout.operator_inputs, moment, |_| true);
         self.report_void(&void);
         if state.is_none() && self.is_first_start() {
             self.take_up_writes();
@@ -327,6 +337,7 @@ impl RemoteIo {
             Some((recalled, holding.stepped))
         });
         if let Some((recalled, stepped)) = recalled {
+            let recalled = &self.recalled_by_these_points(recalled.clone());
             self.diagnosing.recall(&recalled.inputs);
             self.field = recalled.inputs.clone();
             let missed = if stepped <= recalled.sampled {
@@ -336,7 +347,7 @@ impl RemoteIo {
             } else {
                 None
             };
-            self.writing.recall(&self.settings.operator_inputs, recalled, missed);
+            self.writing.recall(&self.layout.operator_inputs, recalled, missed);
         }
         let stations = self.holders.excluded();
         if !self.knowledge.pardons() && !stations.is_empty() {

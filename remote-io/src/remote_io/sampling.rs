@@ -3,7 +3,6 @@
 use understudy_wire::{Body, Image, Moment, Sample, Source, Step, Time, WriteId};
 
 use super::{Authority, Execution, RemoteIo};
-use crate::channel;
 use crate::diagnosis::Observation;
 use crate::event::Event;
 
@@ -34,8 +33,7 @@ impl RemoteIo {
                 self.report(Event::Diagnosed { moment, failed });
             }
         }
-        let channels = &self.settings.channels;
-        self.field = channel::seen(channels, &self.field, &shown, unsteady.as_ref());
+        self.field = self.layout.seen(&self.field, &shown, unsteady.as_ref());
     }
 
     /// Takes u(i)(t) and sends it. Where the sensors are not known no sample is sent, so that no station steps the
@@ -49,12 +47,11 @@ impl RemoteIo {
         };
         let moment = self.moment();
         self.sampled_at = now;
-        self.see(moment, sensors);
+        let own = self.hash();
         let floor = self.knowledge.floor();
         let Some(run) = self.knowledge.run_mut() else {
             return;
         };
-        let operator_inputs = &self.settings.operator_inputs;
         let history = &mut run.history;
         let places =
             self.holders.holdings().filter_map(|(_, holding)| history.place(holding.lineage));
@@ -66,14 +63,27 @@ impl RemoteIo {
         let void = history.make_room(living, floor.map(|floor| floor.lineage));
         let is_lost =
             |id: WriteId| before.iter().any(|(it, place)| *it == id && !history.keeps(*place));
-        let mut void_writes = self.writing.lose(operator_inputs, moment, is_lost);
-        let mut unforced = self.field.clone();
-        self.writing.put(operator_inputs, history.newest(), &mut unforced);
-        let validity = self.signals.put(&self.settings.signals, moment, &mut unforced);
-        let mut inputs = self.forcing.inputs(unforced.clone());
+        let mut void_writes = self.writing.lose(&self.layout.operator_inputs, moment, is_lost);
         let before_change = history.program();
         let (change, resets) = self.replacing.next(history, self.program);
-        if let Some(stop) = self.settings.stop
+        let version = change.or(before_change).unwrap_or(own);
+        let is_laid_out = self.lay_out(version);
+        let sensors = if is_laid_out { self.sensors.clone().unwrap_or(sensors) } else { sensors };
+        self.see(moment, sensors);
+        let newest = self.knowledge.run().and_then(|run| run.history.newest());
+        let newest = newest.and_then(|inputs| self.by_these_points(inputs, before_change));
+        let version = self.named(Some(version));
+
+        let Some(run) = self.knowledge.run_mut() else {
+            return;
+        };
+        let history = &mut run.history;
+        let operator_inputs = &self.layout.operator_inputs;
+        let mut unforced = self.field.clone();
+        self.writing.put(operator_inputs, newest.as_ref().or(history.newest()), &mut unforced);
+        let validity = self.signals.put(&self.layout.signals, moment, &mut unforced);
+        let mut inputs = self.forcing.inputs(unforced.clone());
+        if let Some(stop) = self.layout.stop
             && resets
         {
             inputs.set(stop.reset, true);
@@ -105,6 +115,7 @@ impl RemoteIo {
             writes: self.writing.ids(),
             pulses: self.writing.pulses(operator_inputs),
             unforced: (unforced != inputs).then_some(unforced),
+            version,
         });
         if void > 0 {
             self.report(Event::Voided { moment, samples: void, lineage: base });

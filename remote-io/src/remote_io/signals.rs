@@ -10,15 +10,14 @@
 //! sample.
 
 use smallvec::SmallVec;
-use understudy_cycle::ValueFault;
+use understudy_cycle::{Layout, PointPlace, ValueFault};
 use understudy_wire::{Image, Lineage, Moment, ProgramId, Sample, StationSet};
 
 use super::RemoteIo;
 use crate::event::Event;
 use crate::selection::{Received, Selection};
-use crate::settings::Settings;
-use crate::source::{SignalInput, SignalSource};
 use crate::trust::Trust;
+use understudy_cycle::{SignalInput, SignalSource};
 
 /// Values of signals, and what proves the next ones.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -53,14 +52,37 @@ struct Taken {
 }
 
 impl Signals {
-    pub(super) fn new(settings: &Settings) -> Self {
-        let taken = settings.signals.iter().map(|signal| Taken {
+    pub(super) fn of(layout: &Layout) -> Self {
+        let taken = layout.signals.iter().map(|signal| Taken {
             stored: signal.default,
             of: None,
             age: 0,
             is_valid: false,
         });
-        Self { proofs: vec![None; settings.signal_sources.len()], taken: taken.collect() }
+        Self { proofs: vec![None; layout.signal_sources.len()], taken: taken.collect() }
+    }
+
+    /// The signals are others from now on: one of `old` that stays where `moved` tells, and is the same output, keeps its value.
+    pub(super) fn lay_out(
+        &mut self,
+        old: &Layout,
+        new: &Layout,
+        moved: &dyn Fn(PointPlace) -> Option<PointPlace>,
+    ) {
+        let before = std::mem::replace(self, Self::of(new));
+        for (proof, source) in self.proofs.iter_mut().zip(&new.signal_sources) {
+            let place = old.signal_sources.iter().position(|it| it.program == source.program);
+            *proof = place.and_then(|place| before.proofs[place]);
+        }
+        for (taken, signal) in self.taken.iter_mut().zip(&new.signals) {
+            let is_it = |it: &SignalInput| {
+                (it.from, it.output) == (signal.from, signal.output)
+                    && moved(it.place) == Some(signal.place)
+            };
+            if let Some(place) = old.signals.iter().position(is_it) {
+                *taken = before.taken[place];
+            }
+        }
     }
 
     /// Keeps the newest sample of a source.
@@ -146,7 +168,7 @@ impl RemoteIo {
     pub(super) fn take_signals(&mut self) {
         let moment = self.moment();
         let received = self.received();
-        let sources = self.settings.signal_sources.iter().enumerate();
+        let sources = self.layout.signal_sources.iter().enumerate();
         let outputs: Vec<Option<Image>> = sources
             .map(|(place, source)| self.signals.outputs(place, source, moment, received))
             .collect();
@@ -166,9 +188,9 @@ impl RemoteIo {
         outputs: impl Fn(ProgramId, &[SignalSource]) -> Option<&'a Image>,
     ) {
         let moment = self.moment();
-        let signals = self.settings.signals.iter().zip(&mut self.signals.taken);
+        let signals = self.layout.signals.iter().zip(&mut self.signals.taken);
         for (signal, taken) in signals {
-            match outputs(signal.from, &self.settings.signal_sources) {
+            match outputs(signal.from, &self.layout.signal_sources) {
                 Some(outputs) => {
                     taken.stored = signal.value_in(outputs);
                     taken.of = Some(moment);

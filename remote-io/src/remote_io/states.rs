@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Agreement, Fallback, Input, Machine, Mode, Output, PointPlace, Release, RemoteIoInput,
-    Schedule, SharedOutputs, StaleState, ValueFault,
+    Agreement, Fallback, Input, Layout, Machine, Mode, Output, Release, RemoteIoInput, Schedule,
+    SharedOutputs, StaleState, ValueFault,
 };
 use understudy_testing::states::Table;
 use understudy_wire::{
@@ -89,14 +89,7 @@ impl Bench {
             program: PROGRAM,
             agreement: Arc::new(agreement),
             hash: ProgramHash(1),
-            undriven: Image::zero(1),
-            input_points: PointPlace::booleans(1),
-            output_points: PointPlace::booleans(1),
-            operator_inputs: Vec::new(),
-            signals: Vec::new(),
-            signal_sources: Vec::new(),
-            channels: Vec::new(),
-            stop: None,
+            layout: Arc::new(Layout::booleans(1, 1)),
             diagnosis: None,
             fallback: Fallback {
                 hold_cycles: 2,
@@ -187,6 +180,7 @@ impl Bench {
             lineage,
             stepped,
             digest: Digest(0),
+            version: None,
         };
         let held = match (happening, sample) {
             (OnHistory | ValueFault, Some(sample)) => {
@@ -209,6 +203,7 @@ impl Bench {
             writes: Default::default(),
             pulses: Default::default(),
             inputs: Image::zero(1),
+            version: None,
         };
         Body::Join(Join {
             wants: ProgramSet::EMPTY,

@@ -58,12 +58,17 @@ impl RemoteIo {
     pub fn noting(mut self, found: Option<Note>, is_damaged: bool) -> Self {
         let number = found.as_ref().map_or(0, |note| note.number.saturating_add(1));
         let cluster = self.settings.agreement.cluster;
-        let width = self.settings.undriven.width();
         let found = found.filter(|note| {
             note.cluster == cluster && note.recalled.program == self.settings.program
         });
-        let fits = |note: &Note| note.recalled.inputs.width() == width;
+        let fits = |note: &Note| self.has_width(&note.recalled.inputs, Some(note.hash));
         let found = found.filter(|note| !self.is_loaded(note.hash) || fits(note));
+        // The device was driven by its points until then.
+        if let Some(hash) = found.as_ref().map(|note| note.hash)
+            && self.is_loaded(hash)
+        {
+            self.lay_out(hash);
+        }
         let last = found.clone();
         self.noting =
             Noting { is_on: true, number, found, is_damaged, next: None, last, begun: None };
@@ -155,8 +160,9 @@ impl RemoteIo {
                 excluded: self.trust.excluded(),
                 accounted_for: StationSet::EMPTY,
                 writes: self.writing.ids(),
-                pulses: self.writing.pulses(&self.settings.operator_inputs),
+                pulses: self.writing.pulses(&self.layout.operator_inputs),
                 inputs,
+                version: self.named(Some(self.laid_out)),
             },
         });
     }
@@ -208,7 +214,7 @@ impl RemoteIo {
     fn keep_note(&mut self, note: Note) {
         self.noting.number = note.number.saturating_add(1);
         self.noting.last = Some(note.clone());
-        self.member.put(Output::Retain(Retained::Note(note)));
+        self.member.put(Output::Retain(Box::new(Retained::Note(note))));
     }
 
     /// The newest retained state, but for those of stations that were excluded, with its station.
@@ -330,7 +336,7 @@ impl RemoteIo {
     /// that sample: this remote I/O takes their values from its newest note. The sample after the note was not applied as far as that tells, so no write
     /// was answered that is in it.
     pub(super) fn old_inputs(&self, stepped: Moment) -> Option<OldInputs> {
-        let retains = self.settings.operator_inputs.iter().any(|input| input.retains);
+        let retains = self.layout.operator_inputs.iter().any(|input| input.retains);
         if !retains || !self.is_first_start() {
             return None;
         }
@@ -352,16 +358,25 @@ impl RemoteIo {
 
     /// The newest note that has the inputs of its program.
     fn usable_note(&self) -> Option<&Note> {
-        let width = self.settings.undriven.width();
         let last = self.noting.last.as_ref();
-        last.filter(|note| note.recalled.inputs.width() == width)
+        last.filter(|note| {
+            let is_carried = !self.is_loaded(note.hash);
+            let version = self.named(Some(note.hash)).filter(|_| !is_carried);
+            // Values of another program were carried over to the points of the cluster file.
+            let is_known = !is_carried || !self.replaces_points();
+            is_known && self.has_width(&note.recalled.inputs, version)
+        })
     }
 
     /// At the first start of this life, warm or cold: takes up the operator inputs that keep their values over a power failure, and the writes that
     /// were in effect.
     pub(super) fn take_up_writes(&mut self) {
-        if let Some(recalled) = self.usable_note().map(|note| note.recalled.clone()) {
-            self.writing.start(&self.settings.operator_inputs, &recalled);
+        let noted = self.usable_note().map(|note| {
+            let version = self.named(Some(note.hash));
+            self.recalled_by_these_points(Recalled { version, ..note.recalled.clone() })
+        });
+        if let Some(recalled) = noted {
+            self.writing.start(&self.layout.operator_inputs, &recalled);
         }
     }
 }

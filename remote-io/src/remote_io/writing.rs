@@ -15,7 +15,7 @@ mod sessions;
 use std::time::Duration;
 
 use smallvec::SmallVec;
-use understudy_cycle::Output;
+use understudy_cycle::{Output, PointPlace};
 use understudy_wire::{
     Image, MAXIMUM_PULSES, Moment, Pulse, Recalled, Time, Write, WriteAnswer, WriteId,
     WriteOutcome, WriteRefusal,
@@ -25,7 +25,7 @@ use self::sessions::{Progress, Session, Sessions};
 use super::{Applied, RemoteIo};
 use crate::event::Event;
 use crate::history::History;
-use crate::source::{OperatorInput, OperatorInputKind, ValueMismatch};
+use understudy_cycle::{OperatorInput, OperatorInputKind, ValueMismatch};
 
 /// Time after which a session that does not write is forgotten; a caller asks again for half of it.
 const REMEMBERED_FOR: Duration = Duration::from_secs(60);
@@ -123,7 +123,7 @@ impl Writing {
             let expected = last.saturating_add(1);
             return Err(WriteRefusal::Order { expected });
         }
-        if let Some(refusal) = input.forced(forced) {
+        if let Some(refusal) = forced_out(input, forced) {
             return Err(refusal);
         }
         let is_undecided = before.is_some_and(|session| !session.is_decided());
@@ -134,7 +134,7 @@ impl Writing {
         }
         self.sessions.put(Session::taken(write, at))?;
         let stored = write.value.stored();
-        let left = input.samples(stored);
+        let left = samples(input, stored);
         let value = &mut self.values[at];
         *value = Written { stored, left, by: id, is_sampled: false, ..*value };
         Ok(Taking::New)
@@ -161,7 +161,7 @@ impl Writing {
         image: &mut Image,
     ) {
         let values = inputs.iter().zip(&self.values);
-        for (input, written) in values.filter(|(input, _)| input.forced(forced).is_some()) {
+        for (input, written) in values.filter(|(input, _)| forced_out(input, forced).is_some()) {
             input.place.set(image, written.stored);
         }
     }
@@ -217,6 +217,9 @@ impl Writing {
             }
             session.progress = Progress::Taken;
             let Some(at) = session.input else {
+                if session.is_orphaned {
+                    void.push((session.id, WriteRefusal::Void));
+                }
                 continue;
             };
             let written = &mut self.values[at];
@@ -246,7 +249,7 @@ impl Writing {
                 continue;
             }
             let waits = session.input.is_some_and(|at| self.values[at].waits(&inputs[at], history));
-            match session.input.and_then(|at| inputs[at].forced(forced)) {
+            match session.input.and_then(|at| forced_out(&inputs[at], forced)) {
                 Some(refusal) => void.push((session.id, refusal)),
                 None if waits => {}
                 None => session.progress = now,
@@ -255,7 +258,7 @@ impl Writing {
         self.sessions.drop_void(&void, moment);
         for (at, input) in inputs.iter().enumerate() {
             let waits = self.values[at].waits(input, history);
-            let is_forced = input.forced(forced).is_some();
+            let is_forced = forced_out(input, forced).is_some();
             self.values[at].is_sampled = is_forced || !waits;
             if is_forced {
                 self.replaced_by_force(input, at, &void);
@@ -311,6 +314,43 @@ impl Writing {
             self.values[input].in_effect = value;
         }
         effective
+    }
+
+    /// The operator inputs are others from now on: those of `old` stay where `moved` tells their place in `new`. One of the same kind keeps its value,
+    /// within its limits, and its writes. Answers with the writes that have no effect.
+    pub(super) fn lay_out(
+        &mut self,
+        (old, new): (&[OperatorInput], &[OperatorInput]),
+        moment: Moment,
+        moved: &dyn Fn(PointPlace) -> Option<PointPlace>,
+    ) -> WithoutEffect {
+        let before = std::mem::replace(&mut self.values, Self::new(new).values);
+        let mut stay = vec![None; old.len()];
+        for (place, (input, written)) in old.iter().zip(before).enumerate() {
+            let to = moved(input.place);
+            let found = new.iter().position(|other| {
+                Some(other.place) == to
+                    && other.is_of_kind(input)
+                    && [written.stored, written.in_effect].iter().all(|it| other.admits(*it))
+            });
+            if let Some(found) = found {
+                stay[place] = Some(found);
+                self.values[found] = written;
+            }
+        }
+        let mut void = WithoutEffect::new();
+        for session in self.sessions.iter_mut() {
+            let Some(input) = session.input else {
+                continue;
+            };
+            session.input = stay[input];
+            session.is_orphaned = session.input.is_none();
+            if session.is_orphaned && session.progress == Progress::Taken {
+                void.push((session.id, WriteRefusal::Void));
+            }
+        }
+        self.sessions.drop_void(&void, moment);
+        void
     }
 
     /// Ends a cycle.
@@ -398,31 +438,21 @@ impl Written {
     }
 }
 
-impl OperatorInput {
-    /// Samples until a written value ends: those of a pulse, and the FALSE after it.
-    fn samples(&self, stored: u64) -> u32 {
-        match self.kind {
-            OperatorInputKind::Pulse(samples) if stored != 0 => samples.saturating_add(1),
-            OperatorInputKind::Group { stale_after, .. } => stale_after.max(1),
-            _ => 0,
-        }
+/// Samples until a written value ends: those of a pulse, and the FALSE after it.
+fn samples(input: &OperatorInput, stored: u64) -> u32 {
+    match input.kind {
+        OperatorInputKind::Pulse(samples) if stored != 0 => samples.saturating_add(1),
+        OperatorInputKind::Group { stale_after, .. } => stale_after.max(1),
+        _ => 0,
     }
+}
 
-    /// Reason why a force keeps a write of it out of the samples. A signal of another group is no order of a person: like those of other programs it
-    /// is followed under a force, so that it stays valid.
-    fn forced(&self, forced: Forced<'_>) -> Option<WriteRefusal> {
-        match self.kind {
-            OperatorInputKind::Group { .. } => None,
-            _ => forced(self.place.bit),
-        }
-    }
-
-    /// Bit of u(i) that is TRUE while a value of another group holds.
-    pub fn valid(&self) -> Option<u16> {
-        match self.kind {
-            OperatorInputKind::Group { valid, .. } => valid,
-            _ => None,
-        }
+/// Reason why a force keeps a write of an input out of the samples. A signal of another group is no order of a person: like those of other programs it
+/// is followed under a force, so that it stays valid.
+fn forced_out(input: &OperatorInput, forced: Forced<'_>) -> Option<WriteRefusal> {
+    match input.kind {
+        OperatorInputKind::Group { .. } => None,
+        _ => forced(input.place.bit),
     }
 }
 
@@ -437,7 +467,7 @@ impl RemoteIo {
             && self.sensors.is_some()
             && self.question.is_none()
             && !self.applied.as_ref().is_some_and(Applied::is_of_no_station);
-        let inputs = &self.settings.operator_inputs;
+        let inputs = &self.layout.operator_inputs;
         let taken = match self.writing.known(inputs, write) {
             Some(known) => known,
             None if runs => {

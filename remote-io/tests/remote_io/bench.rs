@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
 use understudy_remote_io::{
-    Event, Fallback, PointPlace, Release, RemoteIo, Settings, SharedOutputs, StaleState, ValueFault,
+    Event, Fallback, Layout, Release, RemoteIo, Settings, SharedOutputs, StaleState, ValueFault,
 };
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
@@ -37,14 +37,7 @@ pub(crate) fn settings(understudies: usize) -> Settings {
         program: PROGRAM,
         agreement: Arc::new(agreement),
         hash: ProgramHash(1),
-        undriven: Image::zero(2),
-        input_points: PointPlace::booleans(2),
-        output_points: PointPlace::booleans(1),
-        operator_inputs: Vec::new(),
-        signals: Vec::new(),
-        signal_sources: Vec::new(),
-        channels: Vec::new(),
-        stop: None,
+        layout: Arc::new(Layout::booleans(2, 1)),
         diagnosis: None,
         fallback: Fallback {
             hold_cycles: 3,
@@ -170,6 +163,7 @@ pub(crate) fn recalled_of(sample: &Sample, sampled: Moment) -> Recalled {
         writes: sample.writes.clone(),
         pulses: sample.pulses.clone(),
         inputs: sample.without_forces().expect("it has the inputs of its cycle").clone(),
+        version: None,
     }
 }
 
@@ -181,6 +175,7 @@ pub(crate) fn held_after(sample: &Sample, stepped: Moment) -> Holding {
         lineage: sample.after,
         stepped,
         digest: Digest(0),
+        version: None,
     }
 }
 

@@ -38,6 +38,7 @@ fn note(program: u64, cycle: u64, lineage: u64) -> Note {
             writes: Default::default(),
             pulses: Default::default(),
             inputs: Image::zero(2),
+            version: None,
         },
     }
 }
@@ -50,6 +51,7 @@ fn kept(program: u64, cycle: u64, lineage: u64, is_whole: bool) -> Kept {
         lineage: Lineage(lineage),
         stepped: moment(cycle),
         digest: Digest(0),
+        version: None,
     };
     Kept { holding, of: ProgramHash(program), is_whole }
 }

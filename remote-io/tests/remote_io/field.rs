@@ -1,8 +1,10 @@
 //! What the plant shows and what a remote I/O makes of it: sensors that cannot be seen, and signals that the operator forces.
 
+use std::sync::Arc;
+
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, Fallback, Missing, OperatorInput, OperatorInputKind, PointPlace, Settings,
+    Event, Fallback, Layout, Missing, OperatorInput, OperatorInputKind, PointPlace, Settings,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
@@ -119,9 +121,12 @@ fn a_force_is_of_a_whole_signal_and_of_a_value_that_it_can_have() {
     ];
     let points: Vec<_> = points.into_iter().map(|(bit, of)| PointPlace { bit, of }).collect();
     let settings = Settings {
-        undriven: Image::zero(128),
-        input_points: points.clone(),
-        output_points: points.clone(),
+        layout: Arc::new(Layout {
+            undriven: Image::zero(128),
+            input_points: points.clone(),
+            output_points: points.clone(),
+            ..Layout::booleans(0, 0)
+        }),
         fallback: Fallback { fail_safe: Image::zero(128), ..settings(1).fallback },
         ..settings(1)
     };
@@ -174,7 +179,10 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
         role: Role::Operator,
         retains: false,
     };
-    let settings = Settings { operator_inputs: vec![level], ..settings(1) };
+    let settings = Settings {
+        layout: Arc::new(Layout { operator_inputs: vec![level], ..Layout::booleans(2, 1) }),
+        ..settings(1)
+    };
     let mut bench = bench(settings);
     let started = (0..60).find_map(|_| bench.cycle().0);
     assert!(started.is_some(), "it starts cold where no station holds a state");

@@ -1,10 +1,11 @@
 //! Writes of inputs that are forced: every order of forces, writes, ends of forces, and cycles with and without proved outputs.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use understudy_cycle::{Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, Fallback, OperatorInput, OperatorInputKind, PointPlace, RemoteIo, Settings,
+    Event, Fallback, Layout, OperatorInput, OperatorInputKind, PointPlace, RemoteIo, Settings,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
@@ -103,15 +104,18 @@ impl Operated {
         let place = place(kind);
         let initial = if place.of == Elementary::Bool { 0 } else { INITIAL };
         let settings = Settings {
-            undriven: Image::zero(32),
-            input_points: vec![place],
-            operator_inputs: vec![OperatorInput {
-                place,
-                kind,
-                initial,
-                role: Role::Operator,
-                retains: false,
-            }],
+            layout: Arc::new(Layout {
+                undriven: Image::zero(32),
+                input_points: vec![place],
+                operator_inputs: vec![OperatorInput {
+                    place,
+                    kind,
+                    initial,
+                    role: Role::Operator,
+                    retains: false,
+                }],
+                ..Layout::booleans(0, 1)
+            }),
             // Writes are taken while outputs are held.
             fallback: Fallback { hold_cycles: 1000, ..settings(1).fallback },
             ..settings(1)

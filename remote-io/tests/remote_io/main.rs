@@ -6,5 +6,6 @@ mod field;
 mod forced_writes;
 mod gone;
 mod pair;
+mod points;
 mod restart;
 mod switching;

@@ -33,6 +33,7 @@ fn sample(bench: &Bench, before: Lineage, drives: bool) -> Sample {
         writes: Default::default(),
         pulses: Default::default(),
         unforced: None,
+        version: None,
     }
 }
 

@@ -1,7 +1,9 @@
 //! A remote I/O that has lost its history: from which state the program goes on.
 
+use std::sync::Arc;
+
 use understudy_cycle::{Input, Output, RemoteIoInput};
-use understudy_remote_io::{Channel, Event, Release, RemoteIo, Settings};
+use understudy_remote_io::{Channel, Event, Layout, Release, RemoteIo, Settings};
 use understudy_wire::{
     Body, Cycle, Digest, Epoch, Force, Holding, Image, Lineage, Moment, Recalled, SamplesReceived,
     SignalPlace, Source, StationId, StationSet,
@@ -32,6 +34,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                 lineage: Lineage(lineage),
                 stepped: moment(stepped),
                 digest: Digest(0),
+                version: None,
             });
             let recalled = Recalled {
                 program: PROGRAM,
@@ -43,6 +46,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                 writes: Default::default(),
                 pulses: Default::default(),
                 inputs: Image::zero(2),
+                version: None,
             };
             said.extend(bench.receive(bench.start(), rank, false, join(holding, Some(recalled))));
         }
@@ -130,7 +134,8 @@ fn a_restart_releases_no_outputs() {
 fn a_failed_channel_keeps_no_forced_value_over_a_restart() {
     for (good, forces) in [(true, 0), (true, 1), (true, 2), (false, 1), (false, 2)] {
         let channels = vec![Channel { input: 0, status: 1 }];
-        let settings = Settings { channels, ..settings(1) };
+        let layout = Arc::new(Layout { channels, ..Layout::booleans(2, 1) });
+        let settings = Settings { layout, ..settings(1) };
         let mut bench = Bench::new(settings.clone(), 100);
         let mut last: Option<(Holding, Recalled, Image)> = None;
         for cycle in 100..140 {

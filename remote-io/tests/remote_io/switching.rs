@@ -53,6 +53,7 @@ fn change() -> Arc<OnlineChange> {
             after: program(NEW),
             forward: Arc::new(Same),
             back: Arc::new(Same),
+            points: None,
         }],
         fallbacks: vec![FallbackChange { program: PROGRAM, before, after }],
     })

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use understudy_cycle::Agreement;
 use understudy_wire::{
-    Actuation, Body, Configurations, Frame, Header, Image, Member, Moment, ProgramId,
+    Actuation, Body, Configurations, Frame, Header, Image, Member, Moment, ProgramHash, ProgramId,
 };
 
 /// Drives and senses the field of one member; never blocks.
@@ -24,6 +24,17 @@ pub trait FieldDriver: Send {
     /// What the outputs are left with where this process ends in order, from now on.
     fn end_with(&mut self, outputs: &Image) {
         let _ = outputs;
+    }
+
+    /// The points of this version of the program count from now on: the field is read and driven by them, and outputs that only the version before has get
+    /// their fail-safe values.
+    fn lay_out(&mut self, version: ProgramHash) {
+        let _ = version;
+    }
+
+    /// The version by whose points the last [`Self::look`] was read, where that is another one than that of the look before.
+    fn read_by(&mut self) -> Option<ProgramHash> {
+        None
     }
 
     /// u(i), where `frame` comes from this field.

@@ -270,6 +270,11 @@ impl<M: Machine> Host<'_, M> {
             return;
         };
         let now = self.clock.now();
+        if let Some(version) = self.field.read_by() {
+            let input = Input::RemoteIo(RemoteIoInput::Points(version));
+            self.machine.handle_input(now, input);
+            self.drain(now, round);
+        }
         let (input, event) = match &look {
             Look::Sensors(sensors) => {
                 (Input::RemoteIo(RemoteIoInput::Field(sensors)), HostEvent::FieldRegained)
@@ -417,10 +422,11 @@ impl<M: Machine> Host<'_, M> {
                 }
                 Output::Connect(connects) => self.field.connect(connects),
                 Output::EndWith(outputs) => self.field.end_with(&outputs),
+                Output::LayOut(version) => self.field.lay_out(version),
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
                 Output::Retain(record) => {
                     if let Some(retainer) = &self.retainer {
-                        retainer.keep(record);
+                        retainer.keep(*record);
                     }
                 }
                 Output::Answer(answer) => self.orders.answer(answer),

@@ -103,6 +103,7 @@ mod tests {
                 writes: smallvec![],
                 pulses: smallvec![],
                 unforced: None,
+                version: None,
             }),
         }
     }

@@ -28,12 +28,12 @@ use thread_priority::{
 };
 use tokio::sync::Notify;
 use tokio::time::{sleep, timeout};
-use understudy_cluster::FieldDevice;
+use understudy_cluster::{FieldDevice, Side};
 use understudy_wire::Image;
 
 use crate::contest::{Contest, READ_BACK_EVERY};
-use crate::exchange::{Link, Trouble, exchange, read_back};
-use crate::plan::Plan;
+use crate::exchange::{Link, Trouble, exchange, leave, read_back};
+use crate::plan::{Left, Plan, requests};
 
 /// Of SCHED_FIFO: behind the cycle and the link, before programs that are not in real time.
 const PRIORITY: u8 = 20;
@@ -70,6 +70,8 @@ pub struct Device {
     /// What was told of it.
     contested: bool,
     connected: bool,
+    /// The number of the wiring by which the newest look was read.
+    looked_by: u64,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -86,6 +88,11 @@ struct State {
     number: u64,
     seen: Look,
     seen_at: Instant,
+    /// The number of the wiring by which that was read.
+    seen_by: u64,
+    wiring: Arc<Wiring>,
+    /// What only the wiring before has, until it is written for the last time.
+    left: Left,
     /// With the time at which they were decided.
     outputs: Option<(Image, Instant)>,
     /// Another master writes its outputs too.
@@ -95,6 +102,15 @@ struct State {
     /// What it is left with; nothing of one of two remote I/Os, since the other one continues.
     fail_safe: Option<Image>,
     ending: bool,
+}
+
+/// Which signal is at which address.
+#[derive(Debug)]
+struct Wiring {
+    /// Counted from 0.
+    number: u64,
+    inputs: Plan,
+    outputs: Plan,
 }
 
 impl Device {
@@ -138,6 +154,13 @@ impl Device {
                 number: 1,
                 seen: Look::Lost("no answer yet".into()),
                 seen_at: Instant::now(),
+                seen_by: 0,
+                wiring: Arc::new(Wiring {
+                    number: 0,
+                    inputs: Plan::new(&settings.inputs),
+                    outputs: Plan::new(&settings.outputs),
+                }),
+                left: Left::new(),
                 outputs: None,
                 contested: false,
                 connected,
@@ -152,16 +175,7 @@ impl Device {
         let thread = std::thread::Builder::new().name("field".into()).spawn(move || {
             prepare(real_time);
             runtime.block_on(
-                Worker {
-                    inputs: Plan::new(&settings.inputs),
-                    outputs: Plan::new(&settings.outputs),
-                    settings,
-                    in_pair,
-                    period,
-                    unread: Cell::new(0),
-                    shared: worker,
-                }
-                .run(),
+                Worker { settings, in_pair, period, unread: Cell::new(0), shared: worker }.run(),
             );
         })?;
         Ok(Self {
@@ -171,6 +185,7 @@ impl Device {
             stale: false,
             contested: false,
             connected,
+            looked_by: 0,
             thread: Some(thread),
         })
     }
@@ -181,6 +196,28 @@ impl Device {
         let decided_at = now.checked_sub(age).unwrap_or(now);
         self.shared.lock().outputs = Some((outputs.clone(), decided_at));
         self.shared.changed.notify_one();
+    }
+
+    /// Reads and drives by another wiring from now on, whose number it answers with. What was to be driven by the one before is not driven any more; outputs
+    /// that only that one has are driven to `last`, its fail-safe values, once.
+    pub fn rewire(&mut self, inputs: &Side, outputs: &Side, last: &Image) -> u64 {
+        let mut state = self.shared.lock();
+        let old = Arc::clone(&state.wiring);
+        let (outputs, left) = Plan::new(outputs).after(&old.outputs, last);
+        let number = old.number + 1;
+        state.wiring = Arc::new(Wiring { number, inputs: Plan::new(inputs), outputs });
+        let outputs = &Arc::clone(&state.wiring).outputs;
+        state.left.retain(|(table, address), _| !outputs.has(*table, *address));
+        state.left.extend(left);
+        state.outputs = None;
+        drop(state);
+        self.shared.changed.notify_one();
+        number
+    }
+
+    /// The number of the wiring by which the newest sensors that were looked at were read; 0 is that of the start.
+    pub fn looked_by(&self) -> u64 {
+        self.looked_by
     }
 
     /// What the device is left with at the end, from now on; without effect for one of two remote I/Os of a program.
@@ -222,6 +259,7 @@ impl Device {
         }
         if is_new {
             self.stale = false;
+            self.looked_by = state.seen_by;
         }
         is_new.then(|| state.seen.clone())
     }
@@ -251,10 +289,19 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// What only the wiring before this one has is written for the last time.
+    fn has_left(&self, wiring: u64) {
+        let mut state = self.lock();
+        if state.wiring.number == wiring {
+            state.left.clear();
+        }
+    }
+
     /// Takes what was seen at a time: this process may have been suspended since.
-    fn see(&self, look: Look, at: Instant) {
+    fn see(&self, look: Look, at: Instant, by: u64) {
         let mut state = self.lock();
         state.number += 1;
+        state.seen_by = by;
         state.seen = look;
         state.seen_at = at;
     }
@@ -280,8 +327,6 @@ fn prepare(real_time: bool) {
 
 struct Worker {
     settings: FieldDevice,
-    inputs: Plan,
-    outputs: Plan,
     /// Whether the remote I/O is one of two of its program.
     in_pair: bool,
     period: Duration,
@@ -332,23 +377,23 @@ impl Worker {
     async fn serve(&self, mut device: Link<'_>) -> bool {
         let mut was_of_use = false;
         // What this connection wrote last: what was there before may be what the device starts with.
-        let mut written: Option<Image> = None;
+        let mut written: Option<(Arc<Wiring>, Image)> = None;
         let mut contest = Contest::default();
         let mut read_at = Instant::now();
         loop {
             let patience = self.settings.timeout;
             device.ends_at(Instant::now() + patience);
-            if let Some(written) = &written
+            if let Some((wiring, written)) = &written
                 && self.unread.get() < UNREAD
                 && !self.shared.lock().ending
                 && read_at.elapsed() >= READ_BACK_EVERY
             {
                 read_at = Instant::now();
-                let read = timeout(patience, read_back(&mut device, &self.outputs)).await;
+                let read = timeout(patience, read_back(&mut device, &wiring.outputs)).await;
                 match read {
                     Ok(Ok(Some(read))) => {
                         self.unread.set(0);
-                        let written = self.outputs.words(written);
+                        let written = wiring.outputs.named(wiring.outputs.words(written));
                         self.shared.lock().contested = contest.compare(&written, &read);
                     }
                     Ok(Ok(None)) => self.unread.set(UNREAD),
@@ -363,15 +408,16 @@ impl Worker {
             }
             // Before the outputs are taken: a suspension from here on is found by the requests.
             let begun = Instant::now();
-            let (outputs, ending) = {
+            let (outputs, ending, wiring, left) = {
                 let state = self.shared.lock();
                 if !state.connected || state.ending && self.in_pair {
                     return was_of_use;
                 }
+                let (wiring, left) = (Arc::clone(&state.wiring), requests(&state.left));
                 if let (true, Some(fail_safe)) = (state.ending, &state.fail_safe) {
-                    (Some((fail_safe.clone(), Instant::now())), true)
+                    (Some((fail_safe.clone(), Instant::now())), true, wiring, left)
                 } else {
-                    (state.outputs.clone(), false)
+                    (state.outputs.clone(), false, wiring, left)
                 }
             };
             if let Some((_, decided_at)) = &outputs
@@ -381,9 +427,16 @@ impl Worker {
                 continue;
             }
             let outputs = outputs.map(|(outputs, _)| outputs);
-            let driven = outputs.as_ref().map(|outputs| (&self.outputs, outputs));
+            let driven = outputs.as_ref().map(|outputs| (&wiring.outputs, outputs));
             device.ends_at(begun + patience);
-            let exchanged = timeout(patience, exchange(&mut device, driven, &self.inputs)).await;
+            let exchanged = timeout(patience, async {
+                leave(&mut device, &left).await?;
+                if !left.is_empty() {
+                    self.shared.has_left(wiring.number);
+                }
+                exchange(&mut device, driven, &wiring.inputs).await
+            });
+            let exchanged = exchanged.await;
             let answered_at = Instant::now();
             if ending {
                 return was_of_use;
@@ -396,13 +449,14 @@ impl Worker {
                 }
                 Ok(Ok(sensors)) => {
                     was_of_use = true;
-                    written = outputs;
-                    self.shared.see(Look::Sensors(sensors), answered_at);
+                    written = outputs.map(|outputs| (Arc::clone(&wiring), outputs));
+                    self.shared.see(Look::Sensors(sensors), answered_at, wiring.number);
                 }
                 Ok(Err(trouble)) => {
                     // Where only the values of the answer are wrong, the outputs were written.
                     let is_written = matches!(trouble, Trouble::Unread(_));
-                    written = outputs.filter(|_| is_written);
+                    let driven = outputs.filter(|_| is_written);
+                    written = driven.map(|outputs| (Arc::clone(&wiring), outputs));
                     let spared = trouble.spares_the_connection();
                     self.lose(self.said(&trouble));
                     if !spared {
@@ -429,7 +483,8 @@ impl Worker {
     }
 
     fn lose(&self, reason: String) {
-        self.shared.see(Look::Lost(reason), Instant::now());
+        let by = self.shared.lock().wiring.number;
+        self.shared.see(Look::Lost(reason), Instant::now(), by);
     }
 }
 

@@ -140,6 +140,17 @@ pub(crate) async fn exchange(
     Ok(inputs.image(&answers)?)
 }
 
+/// Writes outputs that are gone for the last time; one that the device does not take is gone from there too.
+pub(crate) async fn leave(device: &mut Link<'_>, left: &[(Run, Vec<u16>)]) -> Result<(), Trouble> {
+    for (run, words) in left {
+        match write(device, *run, words).await {
+            Ok(()) | Err(Trouble::Exception { .. }) => {}
+            Err(trouble) => return Err(trouble),
+        }
+    }
+    Ok(())
+}
+
 /// The words of y(i), as the device holds them; nothing where it does not let its outputs be read.
 pub(crate) async fn read_back(
     device: &mut Link<'_>,

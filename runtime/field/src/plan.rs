@@ -4,6 +4,8 @@
 //! device may refuse all for one address that it does not have. A number is never divided between two requests: its registers
 //! would be of two moments.
 
+use std::collections::BTreeMap;
+
 use understudy_cluster::{Binding, BitPlace, Place, RegisterTable, Side};
 use understudy_wire::Image;
 
@@ -45,6 +47,39 @@ pub(crate) struct Plan {
     /// The process image with the initial values of all signals without a place.
     rest: Image,
     signals: Vec<Signal>,
+    /// What is written besides the signals, a word for each address of each run: bits of registers that outputs had which are gone.
+    constant: Vec<Vec<u16>>,
+}
+
+/// Words of addresses that are written for the last time.
+pub(crate) type Left = BTreeMap<(Table, u16), u16>;
+
+/// The requests that write them.
+pub(crate) fn requests(left: &Left) -> Vec<(Run, Vec<u16>)> {
+    let mut runs: Vec<(Run, Vec<u16>)> = Vec::new();
+    for (&(table, start), &word) in left {
+        let follows = |run: &Run| {
+            run.table == table
+                && run.end() == u32::from(start)
+                && u32::from(run.count) < most_of(table)
+        };
+        match runs.last_mut().filter(|(run, _)| follows(run)) {
+            Some((run, words)) => {
+                run.count += 1;
+                words.push(word);
+            }
+            None => runs.push((Run { table, start, count: 1 }, vec![word])),
+        }
+    }
+    runs
+}
+
+/// Addresses of one request, at most.
+fn most_of(table: Table) -> u32 {
+    match table {
+        Table::Discrete | Table::Coil => MAXIMUM_BITS,
+        Table::Input | Table::Holding => MAXIMUM_REGISTERS,
+    }
 }
 
 /// A signal, and where in the answers it is.
@@ -73,10 +108,7 @@ impl Plan {
         spans.sort_by_key(|span| (span.table, span.start, span.count));
         let mut runs: Vec<Run> = Vec::new();
         for span in spans {
-            let most = match span.table {
-                Table::Discrete | Table::Coil => MAXIMUM_BITS,
-                Table::Input | Table::Holding => MAXIMUM_REGISTERS,
-            };
+            let most = most_of(span.table);
             let joined = runs.last_mut().filter(|run| {
                 run.table == span.table
                     && u32::from(span.start) <= run.end()
@@ -99,11 +131,48 @@ impl Plan {
                 at: usize::from(span.start - runs[run].start),
             })
         };
+        let zero = runs.iter().map(|run| vec![0; usize::from(run.count)]).collect();
         Self {
             rest: side.rest.clone(),
             signals: side.bindings.iter().filter_map(signal).collect(),
             runs,
+            constant: zero,
         }
+    }
+
+    /// This plan in the place of `old`, whose outputs have these last values, with the words of addresses that only the old one writes. Bits that are gone
+    /// from a register that this plan writes too keep their last values.
+    pub(crate) fn after(mut self, old: &Self, last: &Image) -> (Self, Left) {
+        let named = self.mask();
+        let mut left = Left::new();
+        for (run, words) in old.runs.iter().zip(old.words(last)) {
+            for (address, word) in (run.start..).zip(words) {
+                match self.place_of(run.table, address) {
+                    None => {
+                        left.insert((run.table, address), word);
+                    }
+                    Some((place, at)) if run.table == Table::Holding => {
+                        self.constant[place][at] |= word & !named[place][at];
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+        (self, left)
+    }
+
+    /// Whether it has an address.
+    pub(crate) fn has(&self, table: Table, address: u16) -> bool {
+        self.place_of(table, address).is_some()
+    }
+
+    /// The run of an address, and its place there.
+    fn place_of(&self, table: Table, address: u16) -> Option<(usize, usize)> {
+        let holds = |run: &Run| {
+            run.table == table && run.start <= address && u32::from(address) < run.end()
+        };
+        let place = self.runs.iter().position(holds)?;
+        Some((place, usize::from(address - self.runs[place].start)))
     }
 
     /// The image of the signals, from a word for each address of each run.
@@ -145,6 +214,17 @@ impl Plan {
 
     /// What was read of the outputs without the bits that no signal names.
     pub(crate) fn named(&self, mut answers: Vec<Vec<u16>>) -> Vec<Vec<u16>> {
+        for (answer, named) in answers.iter_mut().zip(self.mask()) {
+            answer.truncate(named.len());
+            for (word, named) in answer.iter_mut().zip(named) {
+                *word &= named;
+            }
+        }
+        answers
+    }
+
+    /// The bits that signals name, a word for each address of each run.
+    fn mask(&self) -> Vec<Vec<u16>> {
         let mut named = self.zero();
         for signal in &self.signals {
             match &signal.binding.place {
@@ -155,13 +235,7 @@ impl Plan {
                 }
             }
         }
-        for (answer, named) in answers.iter_mut().zip(named) {
-            answer.truncate(named.len());
-            for (word, named) in answer.iter_mut().zip(named) {
-                *word &= named;
-            }
-        }
-        answers
+        named
     }
 
     fn zero(&self) -> Vec<Vec<u16>> {
@@ -170,7 +244,7 @@ impl Plan {
     }
 
     fn fill(&self, stored: impl Fn(&Binding) -> u64) -> Vec<Vec<u16>> {
-        let mut words = self.zero();
+        let mut words = self.constant.clone();
         for Signal { binding, run, at } in &self.signals {
             let stored = stored(binding);
             let target = &mut words[*run][*at..];
@@ -307,6 +381,20 @@ mod tests {
         let plan = plan(&["holding:0.3", "holding:1 int"]);
         let read = vec![vec![0xFFFF, 0x1234]];
         assert_eq!(plan.named(read), [vec![8, 0x1234]]);
+    }
+
+    /// Addresses that only the old plan has, and bits that are gone from a register of the new one.
+    #[test]
+    fn what_is_gone_keeps_its_last_values() {
+        let old = plan(&["coil:1", "coil:9", "holding:5.0", "holding:5.3", "holding:7 int"]);
+        let last = old.image(&[vec![1], vec![0], vec![0b1001], vec![0x1234]]).expect("whole");
+        let (new, left) = plan(&["coil:1", "holding:5.0", "holding:6 int"]).after(&old, &last);
+        let run = |table, start| Run { table, start, count: 1 };
+        let expected = [(run(Table::Coil, 9), vec![0]), (run(Table::Holding, 7), vec![0x1234])];
+        assert_eq!(requests(&left), expected);
+        let nothing = Image::zero(128);
+        assert_eq!(new.words(&nothing), [vec![0], vec![0b1000, 0]]);
+        assert_eq!(new.named(new.words(&nothing)), [vec![0], vec![0, 0]]);
     }
 
     proptest! {

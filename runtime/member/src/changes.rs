@@ -15,6 +15,7 @@ use understudy_wire::{
     ChangeName, ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId,
 };
 
+use crate::field::Wirings;
 use crate::run::MemberOptions;
 
 /// The longest text of a change that is read from a file.
@@ -43,6 +44,8 @@ pub(crate) struct StartedChange {
     pub(crate) found: Option<FoundFile>,
     /// What records of this member may be of, besides the programs of the cluster.
     pub(crate) programs: LoadedPrograms,
+    /// Where points are in its device.
+    pub(crate) wirings: Wirings,
 }
 
 /// What a member has kept of online changes, and what takes the next one; `cluster` is that of its file.
@@ -58,7 +61,9 @@ pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> Star
         loaded: None,
         file: file.clone(),
         programs: programs.clone(),
+        wirings: Wirings::default(),
     };
+    let wirings = keeper.wirings.clone();
     let restored = file.as_ref().map_or(Ok(None), |file| keeper.start(file));
     let (restored, problem) = match restored {
         Ok(restored) => (restored, None),
@@ -72,7 +77,8 @@ pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> Star
     let change = restored.as_ref().map(|(change, _)| Arc::clone(change));
     let cluster = keeper.cluster.clone();
     let changes = Changes::new(configurations, change, text, Some(Box::new(keeper)));
-    StartedChange { cluster, restored, changes, found, programs }
+    wirings.learn(&cluster);
+    StartedChange { cluster, restored, changes, found, programs, wirings }
 }
 
 impl StartedChange {
@@ -92,6 +98,7 @@ struct Keeper {
     /// Nothing where the member keeps nothing.
     file: Option<PathBuf>,
     programs: LoadedPrograms,
+    wirings: Wirings,
 }
 
 impl Keeper {
@@ -135,6 +142,7 @@ impl Keeper {
             None => None,
             Some((texts, configurations)) => {
                 let change = texts.load(&cluster).map_err(|error| error.to_string())?;
+                learn(&self.wirings, &cluster, texts);
                 Some((Arc::new(change), *configurations))
             }
         };
@@ -189,6 +197,7 @@ impl ChangeKeeper for Keeper {
             return Err(format!("{}: {refusal}", refusal.code()));
         }
         let change = texts.load(&self.cluster).map_err(|error| format!("U0631: {error}"))?;
+        learn(&self.wirings, &self.cluster, &texts);
         self.loaded = Some(texts);
         self.tell_programs();
         Ok(Arc::new(change))
@@ -227,6 +236,16 @@ impl ChangeKeeper for Keeper {
             )
         })?;
         Ok(text)
+    }
+}
+
+/// The places of points before and after a change that replaces some.
+fn learn(wirings: &Wirings, cluster: &Cluster, texts: &ChangeTexts) {
+    if !texts.points.is_empty() {
+        let both = [texts.before, texts.after];
+        both.into_iter()
+            .filter_map(|it| cluster.changed(texts, it).ok())
+            .for_each(|it| wirings.learn(&it));
     }
 }
 
@@ -273,7 +292,14 @@ mod tests {
         let (cluster, kept) = (cluster.clone(), KeptChanges::default());
         let programs = LoadedPrograms::default();
         let file_of = Some(file.to_owned());
-        let mut keeper = Keeper { cluster, kept, loaded: None, file: file_of, programs };
+        let mut keeper = Keeper {
+            cluster,
+            kept,
+            loaded: None,
+            file: file_of,
+            programs,
+            wirings: Wirings::default(),
+        };
         let restored = keeper.start(file);
         let own = hash(&keeper.cluster);
         let none = Configurations { own, prepared: None };
@@ -291,6 +317,51 @@ mod tests {
     fn end(keeper: &mut Keeper, own: &Cluster) -> String {
         let configurations = Configurations { own: hash(own), prepared: None };
         keeper.keep(configurations).expect("kept")
+    }
+
+    /// Texts with points, loaded by a member with either file and by one that starts again: it knows where the points of both versions are.
+    #[test]
+    fn a_member_learns_where_the_points_of_a_change_are() {
+        let with = |outputs: &str, places: &str| {
+            let device = format!(
+                "[remote_io.field]\nmodbus = \"127.0.0.1:9\"\ninputs = {{ go = \"discrete:0\" }}\noutputs = {{ {places} }}\n"
+            );
+            let program = format!(
+                "PROGRAM one\nVAR_INPUT go : BOOL; END_VAR\nVAR_OUTPUT {outputs} : BOOL; END_VAR\ny := go;\nEND_PROGRAM"
+            );
+            let text = format!("{FILE}{device}");
+            let loaded =
+                understudy_cluster::read("cluster.toml", &text, &mut |_| Ok(program.clone()));
+            loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
+        };
+        let before = with("y", "y = \"coil:1\"");
+        let after = with("z, y", "y = \"coil:2\", z = \"coil:1\"");
+        let texts = ChangeTexts::with_points(&before, &after).expect("an online change");
+        let json = serde_json::to_string(&texts).expect("JSON");
+        let folder = std::env::temp_dir().join(format!("understudy-points-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder");
+        let check = |keeper: &Keeper| {
+            for cluster in [&before, &after] {
+                let hash = cluster.controllers()[0].hash;
+                let outputs = keeper.wirings.outputs(ProgramId(0), hash).expect("it is known");
+                let field = cluster.remote_ios()[0].field.as_ref().expect("a device");
+                assert_eq!(outputs, field.outputs);
+            }
+        };
+        for (own, other) in [(&before, &after), (&after, &before)] {
+            let file = folder.join("kept.one.change");
+            let (_, mut keeper) = start(&file, own);
+            keeper.load(&json).expect("it is of this cluster");
+            check(&keeper);
+            let (own_hash, prepared) = (hash(own), Some(hash(other)));
+            let configurations = Configurations { own: own_hash, prepared };
+            keeper.keep(configurations).expect("kept");
+            let (found, keeper) = start(&file, own);
+            assert_eq!(found, Ok(configurations));
+            check(&keeper);
+            fs::remove_file(&file).expect("removed");
+        }
+        fs::remove_dir_all(&folder).expect("removed");
     }
 
     #[test]

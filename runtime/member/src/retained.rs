@@ -119,7 +119,8 @@ pub(crate) fn retained_notes(
     let inputs = code.interface().inputs;
     let input_at = |bit: u16| inputs.iter().find(|point| point.bit == u32::from(bit));
     let retained_where = |is_wanted: &dyn Fn(&OperatorInput) -> bool| -> Vec<String> {
-        let wanted = settings.operator_inputs.iter().filter(|it| it.retains && is_wanted(it));
+        let wanted =
+            settings.layout.operator_inputs.iter().filter(|it| it.retains && is_wanted(it));
         wanted.filter_map(|input| Some(input_at(input.place.bit)?.name.clone())).collect()
     };
     let retained = retained_where(&|_| true);
@@ -150,8 +151,8 @@ pub(crate) fn retained_notes(
         match files.program(note.hash).and_then(of_this_release) {
             Ok((kept, before)) => {
                 let old = before.interface().inputs;
-                let mut image = settings.undriven.clone();
-                for input in &settings.operator_inputs {
+                let mut image = settings.layout.undriven.clone();
+                for input in &settings.layout.operator_inputs {
                     if let Some(point) = input_at(input.place.bit) {
                         point.set(image.words_mut(), input.initial);
                     }
@@ -180,7 +181,7 @@ pub(crate) fn retained_notes(
         }
     }
     let noted = notes.newest.as_ref().map(|note| &note.recalled.inputs);
-    if let Some(noted) = noted.filter(|noted| noted.width() == settings.undriven.width()) {
+    if let Some(noted) = noted.filter(|noted| noted.width() == settings.layout.input_width()) {
         let outside = retained_where(&|input| !input.admits(input.place.get(noted)));
         carried.dropped.extend(outside);
     }

@@ -13,6 +13,7 @@ use understudy_bus::{
 };
 use understudy_cluster::{Cluster, Link, Twin};
 use understudy_cycle::Machine;
+use understudy_field::Device;
 use understudy_journal::Segments;
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
@@ -21,7 +22,7 @@ use understudy_wire::{Image, Member, Time};
 
 use crate::changes::{StartedChange, started_change};
 use crate::error::MemberError;
-use crate::field::Equipment;
+use crate::field::{Equipment, Wirings};
 use crate::first_numbers::FirstNumbers;
 use crate::held::read_keys;
 use crate::peers::find_member;
@@ -92,7 +93,7 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
         Member::Station(_) | Member::Plant(_) => None,
     };
     let settings = settings.ok_or_else(wrong)?;
-    let field = field_of(options, cluster, member, &settings)?;
+    let field = field_of(options, cluster, member, (&settings, &started.wirings))?;
     let is_retentive = settings.fallback.restart.is_some();
     let mut machine = RemoteIo::new(Time::default(), settings.clone());
     if let Some((change, configurations)) = &started.restored {
@@ -139,7 +140,7 @@ fn field_of(
     options: &MemberOptions,
     cluster: &Cluster,
     member: Member,
-    settings: &understudy_remote_io::Settings,
+    (settings, wirings): (&understudy_remote_io::Settings, &Wirings),
 ) -> Result<Box<dyn FieldDriver>, MemberError> {
     let (agreement, program) = (cluster.agreement(), settings.program);
     let remote_io = cluster.remote_ios().get(program.index());
@@ -149,7 +150,7 @@ fn field_of(
         (Member::Twin(_), Some(twin)) if has_own_modules => twin.field.clone(),
         _ => remote_io.and_then(|remote_io| remote_io.field.clone()),
     };
-    let Some(device) = device else {
+    let Some(places) = device else {
         let field = SimulatedField::new(program, agreement.clone());
         let field = if twin.is_some() { field.of_pair(member, has_own_modules) } else { field };
         let has_plant = cluster.member_name(Member::Plant(program)).is_some();
@@ -157,16 +158,17 @@ fn field_of(
     };
     let period = agreement.schedule.period();
     let fail_safe = &settings.fallback.fail_safe;
-    let equipment = if has_own_modules {
+    let device = if has_own_modules {
         // The modules of one that ends in order are released: those of the other one drive the outputs.
         let released = Image::zero(fail_safe.width());
-        Equipment::start(device, released, period, options.real_time)
+        Device::start(places, released, period, options.real_time)
     } else if twin.is_some() {
-        Equipment::start_in_pair(device, period, options.real_time)
+        Device::start_in_pair(places, period, options.real_time)
     } else {
-        Equipment::start(device, fail_safe.clone(), period, options.real_time)
+        Device::start(places, fail_safe.clone(), period, options.real_time)
     };
-    Ok(Box::new(equipment.map_err(MemberError::Device)?))
+    let device = device.map_err(MemberError::Device)?;
+    Ok(Box::new(Equipment::new(device, (program, settings.hash), wirings.clone())))
 }
 
 fn run<M>(

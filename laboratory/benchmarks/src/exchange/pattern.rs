@@ -180,6 +180,7 @@ fn sample() -> Body {
         writes: Default::default(),
         pulses: Default::default(),
         unforced: None,
+        version: None,
     })
 }
 
@@ -196,6 +197,7 @@ fn turn(own: StationId) -> Body {
         lineage: Lineage(u64::MAX),
         stepped: moment(),
         digest: Digest(u64::MAX),
+        version: None,
     };
     Body::Turn(Turn {
         heard: StationSet::first(usize::from(own.0)),

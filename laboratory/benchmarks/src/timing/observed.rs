@@ -182,6 +182,7 @@ impl<M: Machine> Machine for Observed<M> {
                 Output::Follow(outputs) => Output::Follow(outputs),
                 Output::Connect(connects) => Output::Connect(connects),
                 Output::EndWith(outputs) => Output::EndWith(outputs),
+                Output::LayOut(version) => Output::LayOut(version),
                 Output::Retain(record) => Output::Retain(record),
                 Output::Answer(answer) => Output::Answer(answer),
                 Output::Obeyed(obeyed) => Output::Obeyed(obeyed),

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Agreement, Conversion, FallbackChange, Mode, OnlineChange, Program, ProgramChange, Schedule,
-    Turns,
+    Agreement, Conversion, FallbackChange, Layout, Mode, Moved, OnlineChange, PointsChange,
+    Program, ProgramChange, Schedule, Turns,
 };
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
@@ -69,6 +69,25 @@ fn changed() -> Circuit {
     builder.finish().expect("a circuit")
 }
 
+/// [`changed`] with one more input and one more output, which are the first ones: each point of before has another place.
+fn with_more_points() -> Circuit {
+    let mut builder = CircuitBuilder::new("program");
+    let v = builder.input("v");
+    let u = builder.input("u");
+    let (older, was) = builder.register("x1", false);
+    let (newer, is) = builder.register("x0", true);
+    let (more, set) = builder.register("x2", false);
+    let mixed = builder.graph().xor(was, u);
+    builder.set_next(newer, mixed);
+    builder.set_next(older, is);
+    builder.set_next(more, set);
+    let negated = builder.graph().xor(mixed, set);
+    let other = builder.graph().xor(is, v);
+    builder.output("w", other);
+    builder.output("y", negated);
+    builder.finish().expect("a circuit")
+}
+
 /// Sets the register that the changed program has more, or leaves it out.
 #[derive(Debug)]
 struct MoreRegisters(bool);
@@ -90,6 +109,7 @@ fn change(before: &Program, configuration: ConfigurationHash) -> OnlineChange {
         after,
         forward: Arc::new(MoreRegisters(true)),
         back: Arc::new(MoreRegisters(false)),
+        points: None,
     };
     let after = Fallback { hold_cycles: 2, fail_safe: Image::from_bits([true]), ..fallback() };
     let fallback = FallbackChange { program: ProgramId(0), before: fallback(), after };
@@ -132,7 +152,7 @@ pub(crate) fn paired(wiring: Wiring) -> Parts {
     let mut parts = cell(&[program(false)], (1, 0), Turns::Token);
     for remote_io in &mut parts.remote_ios {
         remote_io.pair = Some(PairSettings { wiring, ..PairSettings::exclusive(1) });
-        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.layout.input_points);
     }
     parts
 }
@@ -144,9 +164,9 @@ pub(crate) fn sharing() -> Parts {
     for remote_io in &mut parts.remote_ios {
         let wiring = Wiring::Parallel { discrepancy_cycles: 2 };
         remote_io.pair = Some(PairSettings { wiring, ..PairSettings::exclusive(1) });
-        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.layout.input_points);
         let places = vec![PointPlace { bit: 0, of: Elementary::Usint }];
-        remote_io.output_points.clone_from(&places);
+        Arc::make_mut(&mut remote_io.layout).output_points.clone_from(&places);
         remote_io.shared_outputs = SharedOutputs { places, delay: 0 };
         remote_io.fallback.fail_safe = Image::zero(8);
     }
@@ -158,7 +178,27 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
     parts_with_spares(understudies, 0, turns)
 }
 
-/// The same with slots of spares, which are understudies of the last ranks.
+/// Two programs, of which the first one has no plant, and other points after the change.
+pub(crate) fn repointing() -> Parts {
+    let mut parts = parts(1, Turns::Token);
+    parts.plants[0] = None;
+    let mut change = OnlineChange::clone(parts.change.as_ref().expect("a change"));
+    let place = |bit| PointPlace { bit, of: Elementary::Bool };
+    let moved = vec![Moved { before: place(0), after: place(1) }];
+    let program = &mut change.programs[0];
+    program.after.executable = (&with_more_points()).into();
+    program.points = Some(Arc::new(PointsChange {
+        before: Arc::clone(&parts.remote_ios[0].layout),
+        after: Arc::new(Layout::booleans(2, 2)),
+        inputs: moved.clone(),
+        outputs: moved,
+    }));
+    change.fallbacks[0].after.fail_safe = Image::from_bits([true, true]);
+    parts.change = Some(Arc::new(change));
+    parts
+}
+
+/// Two programs with slots of spares, which are understudies of the last ranks.
 pub(crate) fn parts_with_spares(understudies: usize, spares: usize, turns: Turns) -> Parts {
     cell(&[program(false), program(true)], (understudies, spares), turns)
 }
@@ -198,14 +238,7 @@ fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Tur
         program: ProgramId(index),
         agreement: Arc::clone(&agreement),
         hash: program.hash,
-        undriven: Image::zero(1),
-        input_points: understudy_remote_io::PointPlace::booleans(1),
-        output_points: understudy_remote_io::PointPlace::booleans(1),
-        operator_inputs: Vec::new(),
-        signals: Vec::new(),
-        signal_sources: Vec::new(),
-        channels: Vec::new(),
-        stop: None,
+        layout: Arc::new(Layout::booleans(1, 1)),
         diagnosis: None,
         fallback: fallback(),
         pair: None,

@@ -6,10 +6,10 @@ use understudy_remote_io::Event;
 use understudy_simulator::{ChangeStep, Record};
 use understudy_wire::Member;
 
-use crate::cell::parts;
+use crate::cell::{parts, repointing};
 
 use crate::starts::{REMOTE_IOS, STATIONS, remote_io, station};
-use crate::{NONE, ONE, check_from};
+use crate::{NONE, ONE, check_from, check_parts};
 
 fn everybody() -> Vec<Member> {
     [&STATIONS[..], &REMOTE_IOS[..]].concat()
@@ -43,6 +43,23 @@ fn the_program_changes_where_everybody_has_loaded_the_change() {
 #[test]
 fn one_of_each_while_a_program_changes() {
     check_from(changing(&everybody(), &[SWITCH]), 1, Budget { cycles: 3, ..ONE }, 15_885);
+}
+
+/// The points of the program change: what is held then, and what is fail-safe, is at the new places.
+#[test]
+fn one_of_each_while_points_change() {
+    let accept = (remote_io(0), ChangeStep::Accept);
+    for (steps, states) in [(&[SWITCH][..], 15_882), (&[SWITCH, accept], 16_436)] {
+        let start = changing(&everybody(), steps);
+        check_parts(repointing(), start, Budget { cycles: 3, ..ONE }, states);
+    }
+}
+
+#[test]
+fn two_crashes_while_points_change() {
+    let budget = Budget { crashes: 2, total: 2, cycles: 1, ..NONE };
+    let start = changing(&everybody(), &[SWITCH]);
+    check_parts(repointing(), start, budget, 24_581);
 }
 
 #[test]

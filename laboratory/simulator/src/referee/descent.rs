@@ -25,6 +25,14 @@ impl Descent {
         }
     }
 
+    /// The outputs are at other places from now on.
+    pub(super) fn moves(&mut self, moved: impl Fn(&Image) -> Image) {
+        if let Some((from, _)) = &mut self.begun {
+            *from = moved(from);
+        }
+        self.last = self.last.as_ref().map(moved);
+    }
+
     /// Records are missing: what the ramps began at is not known.
     pub(super) fn forget(&mut self) {
         *self = Self::default();

@@ -40,6 +40,7 @@ impl Hash for Fallbacks {
 impl Referee {
     /// A remote I/O of the program starts again with this configuration, one of those of the change or another one that has the first settings.
     pub fn starts_with(&mut self, member: Member, own: ConfigurationHash) {
+        self.points.is_new = true;
         let fallbacks = &mut self.fallbacks;
         fallbacks.told.retain(|(of, _)| *of != member);
         let speaker = fallbacks.speaker.replace(member);
@@ -63,16 +64,44 @@ impl Referee {
 
     /// Whether outputs may still be held.
     pub(super) fn may_hold(&self) -> bool {
-        let possible =
-            self.fallbacks.possible(self.programs.change.as_deref(), self.programs.place);
+        let possible = self.possible_fallbacks();
         possible.is_none_or(|all| all.iter().any(|fallback| self.held <= fallback.hold_cycles))
     }
 
     /// Whether outputs may be driven as fail-safe.
     pub(super) fn may_fall_back_to(&self, driven: &Image) -> bool {
-        let possible =
-            self.fallbacks.possible(self.programs.change.as_deref(), self.programs.place);
+        let possible = self.possible_fallbacks();
         possible.is_none_or(|all| all.iter().any(|it| self.descent.permits(driven, it)))
+    }
+
+    /// The settings of the remote I/O whose outputs were judged last, for the points that count; nothing where they are not known.
+    pub(super) fn fallback_in_force(&self) -> Option<Fallback> {
+        let in_force = self.fallbacks.in_force();
+        let own = in_force.fallback.as_ref()?;
+        let (change, program) = (self.programs.change.as_ref(), self.programs.place);
+        let version = self.points.version;
+        let fitted = change.map(|it| it.fitted((own, in_force.configuration), program, version));
+        Some(fitted.unwrap_or_else(|| own.clone()))
+    }
+
+    /// The settings that the remote I/O may have. Before the first sample after a start it may have the points of either version.
+    fn possible_fallbacks(&self) -> Option<Vec<Fallback>> {
+        let (change, program) = (self.programs.change.as_deref(), self.programs.place);
+        let possible = self.fallbacks.possible(change, program)?;
+        let Some(changed) = change.and_then(|change| Some((change, change.of(program)?))) else {
+            return Some(possible.into_iter().map(|(_, fallback)| fallback.clone()).collect());
+        };
+        let (change, of) = changed;
+        let both = [of.before.hash, of.after.hash];
+        let versions = [self.points.version]
+            .into_iter()
+            .chain(both.into_iter().filter(|_| self.points.is_new));
+        let fitted = versions.flat_map(|version| {
+            possible.iter().map(move |(configuration, fallback)| {
+                change.fitted((fallback, *configuration), program, version)
+            })
+        });
+        Some(fitted.collect())
     }
 
     /// Whether the values on the way to the fail-safe ones count; without ramps there is one way to them.
@@ -146,11 +175,12 @@ impl Fallbacks {
         &'a self,
         change: Option<&'a OnlineChange>,
         program: ProgramId,
-    ) -> Option<Vec<&'a Fallback>> {
-        let mut possible = vec![self.in_force().fallback.as_ref()?];
+    ) -> Option<Vec<(ConfigurationHash, &'a Fallback)>> {
+        let in_force = self.in_force();
+        let mut possible = vec![(in_force.configuration, in_force.fallback.as_ref()?)];
         if let Some(change) = change.filter(|_| self.is_new) {
             let both = [change.before, change.after].into_iter();
-            possible.extend(both.filter_map(|it| change.fallback_in(it, program)));
+            possible.extend(both.filter_map(|it| Some((it, change.fallback_in(it, program)?))));
         }
         Some(possible)
     }

@@ -46,6 +46,7 @@ impl Referee {
         };
         let hash = program.hash;
         let outputs = scan(&program.executable, &mut self.scratch, &mut bits, &step.inputs);
+        self.lay_out(hash);
         self.remember(moment, (hash, lineage.after_step(step)), bits);
         self.truth = Some((moment, outputs));
     }

@@ -1,6 +1,8 @@
 //! A referee that never blows its whistle proves nothing: every kind of violation is shown to it.
 
-use understudy_cycle::{Agreement, Conversion, FallbackChange, Mode, ProgramChange, Schedule};
+use understudy_cycle::{
+    Agreement, Conversion, FallbackChange, Layout, Mode, ProgramChange, Schedule,
+};
 use understudy_logic::CircuitBuilder;
 use understudy_remote_io::{Fallback, PointPlace, Ramp, Release, StaleState, ValueFault};
 use understudy_typed::Elementary;
@@ -35,14 +37,7 @@ fn referee() -> Referee {
         program: ProgramId(0),
         agreement: std::sync::Arc::new(agreement),
         hash: ProgramHash(5),
-        undriven: Image::zero(1),
-        input_points: PointPlace::booleans(1),
-        output_points: PointPlace::booleans(1),
-        operator_inputs: Vec::new(),
-        signals: Vec::new(),
-        signal_sources: Vec::new(),
-        channels: Vec::new(),
-        stop: None,
+        layout: std::sync::Arc::new(Layout::booleans(1, 1)),
         diagnosis: None,
         fallback: fallback(),
         pair: None,
@@ -468,8 +463,14 @@ fn a_program_is_judged_during_later_changes_of_others() {
         let [before, after] = [number, number + 1].map(ConfigurationHash);
         Arc::new(OnlineChange { before, after, programs, fallbacks: Vec::new() })
     };
-    let program =
-        ProgramChange { program: ProgramId(0), before, after, forward: way.clone(), back: way };
+    let program = ProgramChange {
+        program: ProgramId(0),
+        before,
+        after,
+        forward: way.clone(),
+        back: way,
+        points: None,
+    };
     referee.learn(&change(1, vec![program]));
     let mut lineage = Lineage::genesis(ProgramHash(5), moment(0));
     let mut sample = |cycle, change| {

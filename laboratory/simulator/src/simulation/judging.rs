@@ -92,10 +92,9 @@ impl Simulation {
             found = Some(Violation::NeedlessQuestion { moment: *moment, station });
         }
         if let (Event::Sampled { moment, inputs, .. }, true) = (event, counts) {
-            let settings = &self.parts.remote_ios[program.index()];
-            let wrong = self.signals.judge(settings, *moment, inputs);
-            found = found.or(wrong).or(unreported);
             let referee = &self.referees[program.index()];
+            let wrong = self.signals.judge(referee.layout(), *moment, inputs);
+            found = found.or(wrong).or(unreported);
             self.signals.note(program, referee.truth());
         }
         if let Some(violation) = found.or(too_much) {

@@ -152,7 +152,8 @@ impl Simulation {
 
     /// An input module of one of two remote I/Os shows a fixed value of an input from now on; the true one again with `None`.
     pub(super) fn stick_input(&mut self, member: Member, input: u16, value: Option<bool>) {
-        let width = |program: ProgramId| self.parts.remote_ios[program.index()].undriven.width();
+        let width =
+            |program: ProgramId| self.parts.remote_ios[program.index()].layout.input_width();
         let there = member.sampled_program().filter(|it| usize::from(input) < width(*it));
         if let Some(program) = there {
             self.modules[program.index()].stick(member, usize::from(input), value);

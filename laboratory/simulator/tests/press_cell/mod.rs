@@ -51,7 +51,7 @@ pub(crate) fn take_turns(parts: &mut Parts, turns: Turns) {
 fn pair_as(parts: &mut Parts, pair: PairSettings) {
     for remote_io in &mut parts.remote_ios {
         remote_io.pair = Some(pair);
-        remote_io.paired_inputs = PairedInput::exact(&remote_io.input_points);
+        remote_io.paired_inputs = PairedInput::exact(&remote_io.layout.input_points);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use understudy_typed::{Fate, WrongPair};
 
+use super::points::FixedPoints;
 use crate::code::{Code, Unnamed};
 
 /// Why a program cannot be replaced by another one while it runs.
@@ -14,6 +15,14 @@ pub enum Unfit {
         program: String,
         /// The first point that differs.
         point: String,
+    },
+    /// The points of a program differ, and cannot while it runs.
+    #[error("the inputs or outputs of `{program}` cannot change while it runs: {why}")]
+    Fixed {
+        /// Name of the controller.
+        program: String,
+        /// Why.
+        why: FixedPoints,
     },
     /// States of the program before or after cannot be converted.
     #[error("`{program}` cannot change while it runs: one of the two programs {why}")]
@@ -57,7 +66,7 @@ impl Unfit {
     /// The code of its page.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Points { .. } | Self::Memory { .. } => "U0630",
+            Self::Points { .. } | Self::Fixed { .. } | Self::Memory { .. } => "U0630",
             Self::Pair { .. } => "U0637",
         }
     }
@@ -98,7 +107,7 @@ impl Unfit {
 }
 
 /// The first point that is not equal in both, in words.
-fn different_point(before: &Code, after: &Code) -> Option<String> {
+pub(super) fn different_point(before: &Code, after: &Code) -> Option<String> {
     let (old, new) = (before.interface(), after.interface());
     let sides = [("input", &old.inputs, &new.inputs), ("output", &old.outputs, &new.outputs)];
     for (side, old, new) in sides {

@@ -187,6 +187,7 @@ mod tests {
                     writes: all_writes(),
                     pulses: all_pulses(),
                     unforced: Some(ones(bits)),
+                    version: None,
                 };
                 let bound = sample_bytes(bits, history, true);
                 check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
@@ -214,6 +215,7 @@ mod tests {
                     lineage: Lineage(u64::MAX),
                     stepped: LATE,
                     digest: Digest(u64::MAX),
+                    version: None,
                 };
                 // More of them do not fit beside programs of this width.
                 let written = programs.min(2);
@@ -235,6 +237,7 @@ mod tests {
                         SmallVec::new()
                     },
                     inputs: ones(bits),
+                    version: None,
                 };
                 let word = Word { mask: ProgramSet::first(programs), sum: ones(bits) };
                 let turn = Turn {

@@ -101,7 +101,7 @@ ready = { from = "right.done", default = true, stale_after = 7 }
         role: Role::Operator,
         retains: false,
     };
-    assert_eq!(settings.operator_inputs, [start, speed]);
+    assert_eq!(settings.layout.operator_inputs, [start, speed]);
     let ready = SignalInput {
         from: ProgramId(1),
         output: 32,
@@ -110,9 +110,9 @@ ready = { from = "right.done", default = true, stale_after = 7 }
         default: 1,
         stale_after: 7,
     };
-    assert_eq!(settings.signals, [ready]);
+    assert_eq!(settings.layout.signals, [ready]);
     let source = SignalSource { program: ProgramId(1), outputs: 34, stopped: Some(33) };
-    assert_eq!(settings.signal_sources, [source]);
+    assert_eq!(settings.layout.signal_sources, [source]);
     let pair = [1, 0].map(|program| Member::RemoteIo(ProgramId(program)));
     let roster = cluster.roster();
     assert!(roster.is_received(pair[0], pair[1]) && !roster.is_received(pair[1], pair[0]));
@@ -130,11 +130,12 @@ fn a_signal_of_another_group_is_an_input_that_ends() {
     let inputs = declared("line-1/press.done", 50) + &declared("line-1/press.level", 75);
     let cluster = load(&with_inputs(&inputs), &FILES).cluster.expect("it is right");
     let settings = cluster.remote_io_settings(ProgramId(0)).expect("it is there");
-    let kinds: Vec<OperatorInputKind> = settings.operator_inputs.iter().map(|it| it.kind).collect();
+    let kinds: Vec<OperatorInputKind> =
+        settings.layout.operator_inputs.iter().map(|it| it.kind).collect();
     let group = |stale_after| OperatorInputKind::Group { stale_after, valid: None };
     assert_eq!(kinds, [group(50), group(75)]);
-    assert_eq!(settings.operator_inputs[0].initial, 1);
-    assert!(settings.signals.is_empty());
+    assert_eq!(settings.layout.operator_inputs[0].initial, 1);
+    assert!(settings.layout.signals.is_empty());
     insta::assert_snapshot!(check(
         "ready = { from = \"line-1/press\", default = false }\n\
          speed = { from = \"line-1/press.level\", default = 0.0, stale_after = 49 }\n"
@@ -152,10 +153,10 @@ fn structured_text_reads_whether_a_signal_is_valid() {
         let cluster = load(&with_inputs(inputs), &files).cluster.expect("it is right");
         cluster.remote_io_settings(ProgramId(0)).expect("it is there")
     };
-    assert_eq!(settings(signal).signals[0].valid, Some(65));
+    assert_eq!(settings(signal).layout.signals[0].valid, Some(65));
     // An input with a source of its own is another one.
     let level = format!("{signal}ready_valid = {{ operator = \"level\" }}\n");
-    assert_eq!(settings(&level).signals[0].valid, None);
+    assert_eq!(settings(&level).layout.signals[0].valid, None);
 }
 
 #[test]

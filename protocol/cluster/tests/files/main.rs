@@ -10,6 +10,7 @@ mod meeting;
 mod notify;
 mod online_change;
 mod plant_file;
+mod points;
 mod press_cell;
 mod renamed;
 mod retention;

@@ -49,7 +49,7 @@ fn every_member_has_a_name_a_place_and_settings() {
     assert_eq!(cell.member_name(Member::Plant(ProgramId(2))), None);
     let robot = cell.remote_io_settings(ProgramId(0)).expect("it is there");
     assert_eq!(robot.fallback.fail_safe.to_string(), "00001", "the gripper stays closed");
-    assert_eq!(robot.undriven.width(), 6);
+    assert_eq!(robot.layout.input_width(), 6);
     let ram = cell.plant_settings(ProgramId(1)).expect("it is there");
     assert_eq!(ram.fed_by, Some(ProgramId(0)));
     assert_eq!(ram.fail_safe, Image::zero(2));

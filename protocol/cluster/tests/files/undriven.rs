@@ -34,7 +34,7 @@ fn read(rest: &str) -> (Option<Image>, Vec<(String, String)>, String) {
     let plant = cluster.plant_settings(ProgramId(0)).map(|plant| plant.plant.field().sensors);
     let device = cluster.remote_ios()[0].field.as_ref().map(|device| device.inputs.rest.clone());
     let shown = plant.or(device);
-    let image = shown.as_ref().unwrap_or(&settings.undriven);
+    let image = shown.as_ref().unwrap_or(&settings.layout.undriven);
     let inputs = cluster.controllers()[0].interface.inputs.iter();
     let values = inputs.map(|point| (point.name.clone(), point.of.text(point.get(image.words()))));
     let values = values.filter(|(name, _)| name.len() == 1).collect();

@@ -32,7 +32,7 @@ impl RemoteIo {
     }
 
     fn receive_their_sample(&mut self, now: Time, sample: &Sample) {
-        let width = self.settings.undriven.width();
+        let width = self.layout.input_width();
         let Some(pairing) = &mut self.pairing else {
             return;
         };

@@ -67,7 +67,7 @@ impl Modules {
         let Wiring::Parallel { discrepancy_cycles } = settings.pair?.wiring else {
             return None;
         };
-        let inputs = PairedInputs::new(&settings.paired_inputs, settings.undriven.clone());
+        let inputs = PairedInputs::new(&settings.paired_inputs, settings.layout.undriven.clone());
         Some(Self {
             discrepancy_cycles,
             distrusted: inputs.distrusted(&settings.paired_inputs),
@@ -167,7 +167,7 @@ impl RemoteIo {
             return;
         };
         let sampled = pairing.received.as_ref().and_then(|sample| sample.without_forces());
-        let last = sampled.unwrap_or(&self.settings.undriven).clone();
+        let last = sampled.unwrap_or(&self.layout.undriven).clone();
         let Some(modules) = &mut pairing.modules else {
             return;
         };
@@ -276,7 +276,7 @@ impl RemoteIo {
     /// Takes what the other one has sent of its modules. What is not sent in answer to a frame of the last periods may be older, and does not count.
     pub(super) fn receive_modules(&mut self, now: Time, theirs: &Pair) {
         let (inputs, outputs) =
-            (self.settings.undriven.width(), self.settings.fallback.fail_safe.width());
+            (self.layout.input_width(), self.settings.fallback.fail_safe.width());
         let oldest = self.period() * AGE;
         let Some(pairing) = &mut self.pairing else {
             return;

@@ -29,6 +29,8 @@ pub(super) struct Session {
     pub(super) input: Option<usize>,
     pub(super) value: Option<PointValue>,
     pub(super) progress: Progress,
+    /// Whether its input is gone by an online change, or is another one.
+    pub(super) is_orphaned: bool,
     /// Cycles since the write.
     idle: u32,
 }
@@ -60,6 +62,7 @@ impl Session {
             input: Some(input),
             value: Some(write.value),
             progress: Progress::Taken,
+            is_orphaned: false,
             idle: 0,
         }
     }
@@ -67,7 +70,7 @@ impl Session {
     /// A write that stations recall.
     pub(super) fn recalled(id: WriteId) -> Self {
         let progress = Progress::Taken;
-        Self { id, owner: None, input: None, value: None, progress, idle: 0 }
+        Self { id, owner: None, input: None, value: None, progress, is_orphaned: false, idle: 0 }
     }
 
     /// Whether a caller has asked for the write since this remote I/O started.
@@ -160,6 +163,7 @@ impl Sessions {
                 session.id.number -= 1;
                 session.value = None;
                 session.input = None;
+                session.is_orphaned = false;
                 // The one before it was decided.
                 session.progress = Progress::InEffect { since: moment };
             }

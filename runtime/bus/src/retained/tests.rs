@@ -75,6 +75,7 @@ fn note(cycle: u64) -> Retained {
             writes: Default::default(),
             pulses: Default::default(),
             inputs: inputs(cycle),
+            version: None,
         },
     })
 }

@@ -128,6 +128,7 @@ fn sample() -> Sample {
         writes: Default::default(),
         pulses: Default::default(),
         unforced: None,
+        version: None,
     }
 }
 

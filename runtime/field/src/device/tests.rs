@@ -103,13 +103,22 @@ fn serve(ends: Ends) -> (SocketAddr, Arc<Held>) {
 
 /// A device with two inputs apart and two outputs apart: four requests in one exchange.
 fn settings(address: SocketAddr) -> FieldDevice {
+    wired(
+        address,
+        "low = \"discrete:0\", high = \"discrete:900\"",
+        "valve = \"coil:3\", pump = \"coil:800\"",
+    )
+}
+
+/// The same device with these places of the signals.
+fn wired(address: SocketAddr, inputs: &str, outputs: &str) -> FieldDevice {
     let text = format!(
         "[cluster]\nname = \"line\"\nsecurity = \"off\"\n\
          [[controller]]\nname = \"tank\"\nladder = \"tank.ladder\"\n\
          [[remote_io]]\nname = \"tank-io\"\ncontroller = \"tank\"\n\
          [remote_io.field]\nmodbus = \"{address}\"\ntimeout = \"5s\"\nstale_after = \"10s\"\n\
-         inputs = {{ low = \"discrete:0\", high = \"discrete:900\" }}\n\
-         outputs = {{ valve = \"coil:3\", pump = \"coil:800\" }}\n"
+         inputs = {{ {inputs} }}\n\
+         outputs = {{ {outputs} }}\n"
     );
     let ladder = "program tank\ninput low\ninput high\noutput valve\noutput pump\n\
                   rung\n    low ( valve )\nrung\n    high ( pump )\n";
@@ -230,6 +239,13 @@ fn an_answer_that_is_taken_up_late_is_old() {
             number: 1,
             seen: Look::Lost("no answer yet".into()),
             seen_at: arrived,
+            seen_by: 0,
+            wiring: Arc::new(Wiring {
+                number: 0,
+                inputs: Plan::new(&Side::default()),
+                outputs: Plan::new(&Side::default()),
+            }),
+            left: Left::new(),
             outputs: None,
             contested: false,
             connected: true,
@@ -245,9 +261,10 @@ fn an_answer_that_is_taken_up_late_is_old() {
             stale: false,
             contested: false,
             connected: true,
+            looked_by: 0,
             thread: None,
         };
-        seen.see(Look::Sensors(Image::zero(1)), arrived);
+        seen.see(Look::Sensors(Image::zero(1)), arrived, 0);
         assert_eq!(matches!(device.look(), Some(Look::Lost(_))), is_lost, "{age:?}");
     }
 }
@@ -295,4 +312,42 @@ fn a_device_of_two_remote_ios_is_written_to_by_the_author() {
     drop(author);
     drop(follower);
     assert_eq!(coils(), driven, "neither drives the fail-safe values when it ends");
+}
+
+/// Another wiring counts from the next exchange on, and what is seen names the wiring that it was read by. A coil that no output has any more gets the
+/// fail-safe value of its output, once; one that another output takes over is driven by that.
+#[test]
+fn outputs_that_are_gone_are_driven_once_more() {
+    let period = Duration::from_millis(2);
+    let (mut device, held) = started(Ends::After(u64::MAX), period);
+    looks(&mut device, period, 3);
+    assert_eq!(device.looked_by(), 0);
+    let (address, _) = serve(Ends::After(u64::MAX));
+    let other = wired(
+        address,
+        "low = \"discrete:4\", high = \"discrete:3\"",
+        "valve = \"coil:4\", pump = \"coil:3\"",
+    );
+    // Valve and pump before, in this order.
+    let last = Image::from_bits([true, false]);
+    let number = device.rewire(&other.inputs, &other.outputs, &last);
+    let mut seen = None;
+    let started = Instant::now();
+    while seen.is_none() || device.looked_by() != number {
+        assert!(started.elapsed() < DEADLINE);
+        device.drive(&Image::from_bits([true, false]), Duration::ZERO);
+        let look = device.look();
+        seen = look.filter(|_| device.looked_by() == number);
+        std::thread::sleep(period);
+    }
+    let coils = || held.coils.lock().expect("no panic").clone();
+    assert_eq!(coils(), BTreeMap::from([(3, false), (4, true), (800, false)]));
+    looks(&mut device, period, 3);
+    assert_eq!(coils(), BTreeMap::from([(3, true), (4, true), (800, false)]));
+    // It is not this remote I/O's any more.
+    held.coils.lock().expect("no panic").insert(800, true);
+    let seen = looks(&mut device, period, 5);
+    assert_eq!(seen.last(), Some(&Look::Sensors(Image::from_bits([true, true]))));
+    assert_eq!(coils().get(&800), Some(&true));
+    assert_eq!(device.contested(), None);
 }

@@ -1,7 +1,8 @@
 //! Inputs of a program that do not come from its field: operators write them, or another program computes them.
 
-use understudy_cycle::{PointPlace, in_order};
 use understudy_wire::{Image, PointValue, ProgramId, Role};
+
+use crate::place::{PointPlace, in_order};
 
 /// Input that operators write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -79,6 +80,19 @@ impl OperatorInput {
                 in_order(of, low, stored) && in_order(of, stored, high)
             }
             _ => true,
+        }
+    }
+
+    /// Whether values of both mean the same: orders that last, numbers, presses of a button, or values of another group.
+    pub fn is_of_kind(&self, other: &Self) -> bool {
+        std::mem::discriminant(&self.kind) == std::mem::discriminant(&other.kind)
+    }
+
+    /// Bit of u(i) that is TRUE while a value of another group holds.
+    pub fn valid(&self) -> Option<u16> {
+        match self.kind {
+            OperatorInputKind::Group { valid, .. } => valid,
+            _ => None,
         }
     }
 }

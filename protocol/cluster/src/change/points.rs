@@ -1,0 +1,331 @@
+//! Online changes in which inputs or outputs of a program differ.
+//!
+//! The points of a program are a part of its version: the change mark of a history tells from which sample on which of them count.
+
+use std::fmt;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use understudy_cycle::{
+    FallbackChange, Mode, Moved, OnlineChange, PointPlace, PointsChange, Program, ProgramChange,
+};
+use understudy_typed::{Declared, Point, Points};
+use understudy_wire::ProgramId;
+
+use super::settings::{ChangedSetting, changed_settings};
+use super::unfit::different_point;
+use super::{
+    Between, ChangeError, ChangeTexts, ChangedFallback, ChangedText, NeedsStop, ProgramText, Unfit,
+};
+use crate::cluster::{Cluster, Controller};
+use crate::configuration::{FALLBACK, INPUT, input_line};
+use crate::read::{Overrides, read_with};
+
+/// The points of a program that change: the sections of its remote I/O before and after.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChangedPoints {
+    /// Its program.
+    pub program: ProgramId,
+    /// Section of the cluster file before.
+    pub before: String,
+    /// Section of the cluster file after.
+    pub after: String,
+}
+
+impl ChangedPoints {
+    pub(super) fn back(self) -> Self {
+        let Self { program, before, after } = self;
+        Self { program, before: after, after: before }
+    }
+}
+
+/// Why the points of a program cannot change while it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FixedPoints {
+    /// It has a second remote I/O.
+    Twin,
+    /// A ladder diagnoses its channels.
+    Diagnosis,
+    /// Its plant is simulated.
+    Plant,
+    /// Another program reads one of its outputs.
+    ReadByAnother,
+    /// The cluster has the mode of the paper.
+    PaperMode,
+    /// Only one of the files has a device for it.
+    Device,
+}
+
+impl fmt::Display for FixedPoints {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Twin => "its remote I/O has a twin",
+            Self::Diagnosis => "its remote I/O has a diagnosis",
+            Self::Plant => "its plant is simulated",
+            Self::ReadByAnother => "another program reads an output of it",
+            Self::PaperMode => "the cluster has `mode = \"paper\"`",
+            Self::Device => "only one of the files has a device for it",
+        })
+    }
+}
+
+/// The online change from one cluster to another one, in which points of programs may differ.
+///
+/// # Errors
+/// Why it needs a stop.
+pub fn change_with_points(
+    before: &Cluster,
+    after: &Cluster,
+) -> Result<OnlineChange, Vec<NeedsStop>> {
+    if before.name() != after.name() {
+        let (before, after) = (before.name().to_owned(), after.name().to_owned());
+        return Err(vec![NeedsStop::OtherCluster { before, after }]);
+    }
+    let mut reasons = Vec::new();
+    let both = before.controllers.iter().zip(&after.controllers);
+    let replaced =
+        both.clone().zip(&before.remote_ios).filter(|((old, new), _)| old.hash != new.hash);
+    let of_replaced: Vec<String> =
+        replaced.map(|(_, remote_io)| format!("remote I/O `{}`", remote_io.name)).collect();
+    // Where the inputs of a program come from is a part of its points.
+    let is_of_points = |setting: &ChangedSetting| matches!(setting, ChangedSetting::Key { of, key, .. } if key == "`inputs`" && of_replaced.contains(of));
+    let changed = changed_settings(&before.frame_text, &after.frame_text);
+    let others = changed.into_iter().filter(|setting| !is_of_points(setting));
+    reasons.extend(others.map(NeedsStop::Setting));
+    let (mut programs, mut fallbacks) = (Vec::new(), Vec::new());
+    for (program, (old, new)) in (0..).map(ProgramId).zip(both) {
+        if old.name != new.name {
+            continue;
+        }
+        let points = points_change(before, after, program);
+        if points.is_some() {
+            let fixed = fixed_points(before, after, program);
+            let program = &old.name;
+            reasons.extend(fixed.map(|why| Unfit::Fixed { program: program.clone(), why }.into()));
+        }
+        let remote_ios = [before, after].map(|cluster| cluster.remote_ios.get(program.index()));
+        if let [Some(one), Some(other)] = remote_ios {
+            match ChangedFallback::between(program, one, other) {
+                Ok(None) if points.is_none() => {}
+                Ok(_) => fallbacks.push(FallbackChange {
+                    program,
+                    before: one.fallback.clone(),
+                    after: other.fallback.clone(),
+                }),
+                Err(changed) => reasons.push(NeedsStop::Setting(changed)),
+            }
+        }
+        if old.hash != new.hash {
+            let unfit = Unfit::memory(&old.name, &old.code, &new.code).into_iter();
+            let unfit = unfit.chain(Unfit::pairs(&old.name, &old.code, &new.code));
+            reasons.extend(unfit.map(NeedsStop::from));
+            programs.push(program_change(program, (old, new), points));
+        }
+    }
+    if !reasons.is_empty() {
+        return Err(reasons);
+    }
+    let [before, after] = [before, after].map(|cluster| cluster.agreement().configuration);
+    Ok(OnlineChange { before, after, programs, fallbacks })
+}
+
+impl ChangeTexts {
+    /// The change from one cluster file to another one, in which points may differ.
+    ///
+    /// # Errors
+    /// Why it needs a stop.
+    pub fn with_points(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
+        let change = change_with_points(before, after)?;
+        let (mut programs, mut fallbacks, mut points) = (Vec::new(), Vec::new(), Vec::new());
+        for program in (0..before.controllers.len()).map(|index| ProgramId(index as u8)) {
+            let place = program.index();
+            let [old, new] = [before, after].map(|cluster| &cluster.controllers[place]);
+            let [one, other] = [before, after].map(|cluster| &cluster.remote_ios[place]);
+            let changed = change.of(program);
+            if changed.is_some() {
+                programs.push(ChangedText {
+                    program,
+                    before: ProgramText::of(&old.code, old.hash),
+                    after: ProgramText::of(&new.code, new.hash),
+                });
+            }
+            if changed.is_some_and(|changed| changed.points.is_some()) {
+                let (before, after) = (one.section.clone(), other.section.clone());
+                points.push(ChangedPoints { program, before, after });
+            } else {
+                let changed = ChangedFallback::between(program, one, other);
+                fallbacks.extend(changed.map_err(|changed| vec![NeedsStop::Setting(changed)])?);
+            }
+        }
+        let cluster = before.agreement().cluster.0;
+        Ok(ChangeTexts {
+            cluster,
+            before: change.before,
+            after: change.after,
+            programs,
+            fallbacks,
+            points,
+        })
+    }
+
+    /// The same where points change: each side is read as a cluster.
+    pub(super) fn load_with_points(&self, cluster: &Cluster) -> Result<OnlineChange, ChangeError> {
+        let own = cluster.agreement().configuration;
+        let is_before = own == self.before;
+        let other = if is_before { self.after } else { self.before };
+        let changed = cluster.changed(self, other)?;
+        if changed.agreement().configuration != other {
+            return Err(ChangeError::NotItsResult { claimed: other });
+        }
+        let (before, after) = if is_before { (cluster, &changed) } else { (&changed, cluster) };
+        let change = change_with_points(before, after);
+        change.map_err(|_| ChangeError::NotItsResult { claimed: other })
+    }
+}
+
+impl Cluster {
+    /// Takes the points of a program and what its remote I/O does with them from a section; the programs of this cluster are those of the section already.
+    pub(super) fn take_points(
+        &mut self,
+        program: ProgramId,
+        section: &str,
+    ) -> Result<(), ChangeError> {
+        let unread = |file: &str| ChangeError::Unreadable { file: file.to_owned() };
+        let sources: Vec<_> = self.controllers.iter().map(|it| it.code.source()).collect();
+        // Files of two controllers may have one name in two folders.
+        let file = |place: usize| format!("{place}/{}", sources[place].file);
+        let cluster = [("name", self.name.clone()), ("security", "off".to_owned())];
+        let table = |keys: &[(&str, String)]| {
+            let keys = keys.iter().map(|(key, value)| ((*key).to_owned(), value.clone().into()));
+            toml::Value::Table(keys.collect())
+        };
+        let controllers = self.controllers.iter().enumerate().map(|(place, controller)| {
+            table(&[("name", controller.name.clone()), ("ladder", file(place))])
+        });
+        let document = [
+            ("cluster".to_owned(), table(&cluster)),
+            ("controller".to_owned(), toml::Value::Array(controllers.collect())),
+        ];
+        let document: toml::Table = document.into_iter().collect();
+        let text = format!("{document}\n{section}");
+        let overrides =
+            Overrides { period: Some(self.agreement.schedule.period()), ..Overrides::default() };
+        let loaded = read_with("cluster.toml", &text, overrides, &mut |name| {
+            let place = (0..sources.len()).find(|place| file(*place) == name);
+            place.map(|place| sources[place].text.to_string()).ok_or_else(String::new)
+        });
+        let read = loaded.cluster.ok_or_else(|| unread("cluster.toml"))?;
+        let place = program.index();
+        let (Some(own), Some(read)) = (self.remote_ios.get_mut(place), read.remote_ios.get(place))
+        else {
+            return Err(ChangeError::NoSuchProgram { program });
+        };
+        own.inputs.clone_from(&read.inputs);
+        own.field.clone_from(&read.field);
+        own.fallback = read.fallback.clone();
+        own.section = section.to_owned();
+        let inputs: Vec<String> = own.inputs.iter().map(input_line).collect();
+        self.frame_text = with_inputs(&self.frame_text, &own.name, &inputs);
+        Ok(())
+    }
+}
+
+/// The text of a configuration with these lines for the inputs of a remote I/O.
+fn with_inputs(text: &str, remote_io: &str, inputs: &[String]) -> String {
+    let heading = format!("remote io {remote_io}");
+    let mut is_its = false;
+    let mut lines: Vec<&str> = Vec::new();
+    for line in text.lines() {
+        if !line.starts_with(' ') {
+            is_its = line == heading;
+        }
+        if is_its && line.starts_with(INPUT) {
+            continue;
+        }
+        lines.push(line);
+        // A program whose points change has neither a twin nor a diagnosis: the inputs are the last lines of its remote I/O.
+        if is_its && line == FALLBACK {
+            lines.extend(inputs.iter().map(String::as_str));
+        }
+    }
+    lines.iter().flat_map(|line| [line, "\n"]).collect()
+}
+
+fn program_change(
+    program: ProgramId,
+    (old, new): (&Controller, &Controller),
+    points: Option<PointsChange>,
+) -> ProgramChange {
+    let version = |it: &Controller| Program { hash: it.hash, executable: it.code.executable() };
+    ProgramChange {
+        program,
+        before: version(old),
+        after: version(new),
+        forward: Arc::new(Between::new(&old.code, &new.code)),
+        back: Arc::new(Between::new(&new.code, &old.code)),
+        points: points.map(Arc::new),
+    }
+}
+
+/// What becomes of the points of a program; nothing where it has the same ones, by name, type and place, and from the same sources.
+fn points_change(before: &Cluster, after: &Cluster, program: ProgramId) -> Option<PointsChange> {
+    let [old, new] = [before, after].map(|cluster| cluster.controllers.get(program.index()));
+    let (old, new) = (old?, new?);
+    let (old_layout, new_layout) = (before.layout(program)?, after.layout(program)?);
+    let wired = [before, after].map(|cluster| {
+        let field = cluster.remote_ios.get(program.index())?.field.as_ref();
+        field.map(|field| (&field.inputs, &field.outputs))
+    });
+    let is_equal = old_layout == new_layout && wired[0] == wired[1];
+    // A device that is wired in another way has other points where the program is another one: without a mark, nothing tells when.
+    if old.hash == new.hash || different_point(&old.code, &new.code).is_none() && is_equal {
+        return None;
+    }
+    Some(PointsChange {
+        before: Arc::new(old_layout),
+        after: Arc::new(new_layout),
+        inputs: moved(&old.interface.inputs, &new.interface.inputs),
+        outputs: moved(&old.interface.outputs, &new.interface.outputs),
+    })
+}
+
+/// Points of both, by name and type; an enumeration is of the same type where its names have the same numbers.
+fn moved(old: &Points, new: &Points) -> Vec<Moved> {
+    let whole = |point: &Point| Declared { range: None, ..point.declared() };
+    let moved = old.iter().filter_map(|before| {
+        let after = new.find(&before.name)?;
+        let stays = whole(before).takes(&whole(after)) && whole(after).takes(&whole(before));
+        stays.then(|| Moved { before: PointPlace::of(before), after: PointPlace::of(after) })
+    });
+    moved.collect()
+}
+
+/// Why the points of a program cannot change while it runs.
+fn fixed_points(
+    before: &Cluster,
+    after: &Cluster,
+    program: ProgramId,
+) -> impl Iterator<Item = FixedPoints> {
+    let place = program.index();
+    let clusters = [before, after];
+    let has = move |is: &dyn Fn(&Cluster) -> bool| clusters.iter().any(|cluster| is(cluster));
+    let reasons = [
+        (FixedPoints::Twin, has(&|it| it.remote_ios[place].twin.is_some())),
+        (FixedPoints::Diagnosis, has(&|it| it.remote_ios[place].diagnosis.is_some())),
+        (FixedPoints::Plant, has(&|it| it.plants[place].is_some())),
+        (
+            FixedPoints::ReadByAnother,
+            has(&|it| {
+                let mut signals = it.remote_ios.iter().flat_map(|reader| reader.signals());
+                signals.any(|signal| signal.input.from == program)
+            }),
+        ),
+        (FixedPoints::PaperMode, has(&|it| it.agreement.mode == Mode::Paper)),
+        (FixedPoints::Device, {
+            let [old, new] = clusters.map(|it| it.remote_ios[place].field.is_some());
+            old != new
+        }),
+    ];
+    reasons.into_iter().filter_map(|(why, is_so)| is_so.then_some(why))
+}
