@@ -132,11 +132,8 @@ fn cluster(program: &str) -> String {
 #[test]
 fn a_point_is_what_its_author_declared() {
     let folder = empty_folder("points");
-    let joined = |of: &dyn Fn(&Row) -> String, between: &str| {
-        POINTS.iter().map(of).collect::<Vec<String>>().join(between)
-    };
-    let scan = joined(&|row| row.scan.to_owned(), " ");
-    let names = joined(&|row| row.name.to_owned(), " ");
+    let scan = joined(|row| row.scan.to_owned(), " ");
+    let names = joined(|row| row.name.to_owned(), " ");
     fs::write(folder.join("inputs.txt"), format!("# {names}\n{scan}\n")).expect("written");
     for program in programs(&folder) {
         run(&folder, &["check", program]);
@@ -169,7 +166,7 @@ fn a_point_is_what_its_author_declared() {
         }
         proved_and_drawn(&folder, program);
         drafted(&folder, program);
-        of_a_run(&folder, program, &joined);
+        of_a_run(&folder, program);
     }
 }
 
@@ -216,12 +213,12 @@ fn drafted(folder: &Path, program: &str) {
     run(folder, &["simulate", "draft/cluster.toml", "--cycles", "30", "--seed", "1"]);
 }
 
+fn joined(of: impl Fn(&Row) -> String, between: &str) -> String {
+    POINTS.iter().map(of).collect::<Vec<String>>().join(between)
+}
+
 /// A run shows every value as its cluster file has it.
-fn of_a_run(
-    folder: &Path,
-    program: &str,
-    joined: &dyn Fn(&dyn Fn(&Row) -> String, &str) -> String,
-) {
+fn of_a_run(folder: &Path, program: &str) {
     fs::write(folder.join("cell.toml"), cluster(program)).expect("written");
     run(folder, &["check", "cell.toml"]);
     for Row { name, of, wrong, .. } in POINTS.iter().filter(|row| row.of != "BOOL") {
@@ -239,8 +236,8 @@ fn of_a_run(
     }
     let _ = fs::remove_dir_all(folder.join("runs"));
     run(folder, &["simulate", "cell.toml", "--cycles", "40", "--seed", "1", "--out", "runs"]);
-    let sampled = joined(&|row| format!("{} = {}", row.name, row.shown), ", ");
-    let driven = joined(&|row| format!("q{} = {}", row.name, row.shown), ", ");
+    let sampled = joined(|row| format!("{} = {}", row.name, row.shown), ", ");
+    let driven = joined(|row| format!("q{} = {}", row.name, row.shown), ", ");
     let journal = run(folder, &["journal", "runs/latest", "--all", "--from", "20", "--to", "20"]);
     for line in [format!("samples {sampled}"), format!("drives {driven}, direct")] {
         assert!(journal.contains(&line), "{program} {line}: {journal}");
