@@ -131,7 +131,7 @@ fn every_single_link_heals() {
     }
 }
 
-/// In a cell with few controllers nobody but the cycle master sends soon: a remote I/O that does not receive it begins its cycles with the Sync of the next
+/// In a cell with few controllers only the cycle master sends soon: a remote I/O that does not receive it begins its cycles with the Sync of the next
 /// rank.
 #[test]
 fn a_single_link_of_a_small_cell_costs_no_cycle() {
