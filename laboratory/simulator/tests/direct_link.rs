@@ -140,6 +140,38 @@ fn an_author_without_stations_gives_the_outputs_to_the_follower() {
     }
 }
 
+/// The author loses all stations, the follower takes over, and is suspended or restarted: it drives again, though it receives the other one, which receives
+/// no station.
+#[test]
+fn one_that_receives_no_station_does_not_keep_the_other_one_from_driving() {
+    for (wire, isolated) in WIRINGS.into_iter().flat_map(|wire| [FIRST, TWIN].map(|it| (wire, it)))
+    {
+        let healthy = if isolated == FIRST { TWIN } else { FIRST };
+        for after in 1..=3 {
+            for tenth in 0..10 {
+                let phase = f64::from(tenth) / 10.0;
+                let pulled = Via::NETWORKS
+                    .map(|network| fault(100, phase, isolated, Action::Unplug { network }));
+                for (begins, ends) in
+                    [(Action::Stop, Action::Continue), (Action::Crash, Action::Restart)]
+                {
+                    for lasts in [1, 2, 5, 30] {
+                        let mut faults = pulled.to_vec();
+                        faults.push(fault(200, phase, healthy, begins));
+                        faults.push(fault(200 + lasts, phase, healthy, ends));
+                        let outcome = run(parts(wire, after, true), &faults, 400);
+                        let what = format!("{isolated:?} {after} {phase} {begins:?} {lasts}");
+                        let author = outcome.simulation.author(ROBOT);
+                        assert_eq!(author, Some(healthy), "{what}");
+                        let bound = lasts + 10 * u64::from(after) + 40;
+                        assert!(outcome.held <= bound, "{what}: {}", outcome.held);
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// The link fails and comes back: no cycle is lost.
 #[test]
 fn a_link_that_fails_costs_no_cycle() {

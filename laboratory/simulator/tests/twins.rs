@@ -4,6 +4,8 @@ mod press_cell;
 
 use std::time::Duration;
 
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use understudy_cycle::Mode;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
@@ -196,9 +198,9 @@ fn one_that_returns_with_a_part_of_the_stations_can_be_started() {
     let wirings: [fn(&mut Parts, u32); 2] = [press_cell::pair, press_cell::pair_parallel];
     let cases = wirings.into_iter().flat_map(|wire| [FIRST, TWIN].map(|away| (wire, away)));
     let cases = cases.flat_map(|(wire, away)| stations.map(|station| (wire, [away, station])));
-    for ((wire, away), place) in cases.flat_map(|case| (0..10).map(move |place| (case, place))) {
+    for ((wire, away), place) in cases.flat_map(|case| (0..4).map(move |place| (case, place))) {
         for returns in [None, Some(Action::RestartWrongProgram)] {
-            let phase = f64::from(place) / 10.0;
+            let phase = f64::from(place) * 0.3;
             let mut parts = press_cell::parts(Mode::Full, 1);
             wire(&mut parts, 1);
             let mut simulation = Simulation::new(parts, Network::default(), 1);
@@ -219,19 +221,89 @@ fn one_that_returns_with_a_part_of_the_stations_can_be_started() {
                     source: Source::Direct | Source::Reconstructed,
                     ..
                 }) if member == alone && cycle > Some(60) => {
-                    applied[usize::from(cycle > Some(200))] += 1;
+                    applied[usize::from(cycle > Some(700))] += 1;
                 }
                 _ => {}
             };
             simulation.run(60, 200, &mut observe).expect("the cluster gets ready");
-            simulation.go_to(200, 0.0, &mut observe);
+            simulation.go_to(700, 0.0, &mut observe);
             let choice = StateChoice::Cold;
-            simulation.schedule(fault(200, 0.5, alone, Action::Choose { choice }));
-            simulation.go_to(260, 0.0, &mut observe);
+            simulation.schedule(fault(700, 0.5, alone, Action::Choose { choice }));
+            simulation.go_to(760, 0.0, &mut observe);
             let case = format!("{away:?} are away, at {phase}, {returns:?}");
             assert_eq!(simulation.violations(), [], "{case}");
             assert!(is_told || applied[0] > 100, "{case}: {applied:?}");
             assert!(applied[1] > 50, "{case}: {applied:?}");
         }
+    }
+}
+
+/// After a power failure one of the two and one station return later than the other ones: all start by themselves, also where the operator was asked meanwhile.
+#[test]
+fn members_that_return_one_after_another_start_by_themselves() {
+    let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
+    let pairs = [ROBOT, ProgramId(1)].map(|it| [Member::RemoteIo(it), Member::Twin(it)]);
+    let wirings: [fn(&mut Parts, u32); 2] = [press_cell::pair, press_cell::pair_parallel];
+    let cases = wirings.into_iter().flat_map(|wire| [FIRST, TWIN].map(|late| (wire, late)));
+    let cases = cases.flat_map(|(wire, late)| stations.map(|station| (wire, [late, station])));
+    for ((wire, late), later) in cases.flat_map(|case| [10, 30, 100, 600].map(|it| (case, it))) {
+        let mut parts = press_cell::parts(Mode::Full, 1);
+        wire(&mut parts, 1);
+        let mut simulation = Simulation::new(parts, Network::default(), later);
+        for member in stations.into_iter().chain(pairs.concat()) {
+            simulation.schedule(fault(50, 0.3, member, Action::Crash));
+            let returns = if late.contains(&member) { 60 + later } else { 60 };
+            simulation.schedule(fault(returns, 0.7, member, Action::Restart));
+        }
+        let mut applied = 0;
+        let mut observe = |_, cycle, member, record: Record<'_>| match record {
+            Record::RemoteIo(Event::Applied {
+                source: Source::Direct | Source::Reconstructed,
+                ..
+            }) if [FIRST, TWIN].contains(&member) && cycle > Some(60 + later) => applied += 1,
+            _ => {}
+        };
+        simulation.run(60, 200, &mut observe).expect("the cluster gets ready");
+        simulation.go_to(260 + later, 0.0, &mut observe);
+        let case = format!("{late:?} return {later} cycles later");
+        assert_eq!(simulation.violations(), [], "{case}");
+        assert!(applied > 100, "{case}: {applied}");
+    }
+}
+
+/// All members return at times of their own within 0.8 s.
+#[test]
+fn members_that_return_in_any_order_start_by_themselves() {
+    let mut random = Pcg64Mcg::seed_from_u64(36);
+    let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
+    let pairs = [ROBOT, ProgramId(1)].map(|it| [Member::RemoteIo(it), Member::Twin(it)]);
+    let wirings: [fn(&mut Parts, u32); 2] = [press_cell::pair, press_cell::pair_parallel];
+    for seed in 0..60 {
+        let mut parts = press_cell::parts(Mode::Full, 1);
+        wirings[seed as usize % 2](&mut parts, random.random_range(1..=3));
+        let mut simulation = Simulation::new(parts, Network::default(), seed);
+        let mut order = Vec::new();
+        for member in stations.into_iter().chain(pairs.concat()) {
+            simulation.schedule(fault(50, 0.3, member, Action::Crash));
+            let (at, phase) = (random.random_range(60..140), random.random_range(0.0..1.0));
+            simulation.schedule(fault(at, phase, member, Action::Restart));
+            order.push((member, at));
+        }
+        let mut applied = [0; 2];
+        let mut observe = |_, cycle, member: Member, record: Record<'_>| match record {
+            Record::RemoteIo(Event::Applied {
+                source: Source::Direct | Source::Reconstructed,
+                ..
+            }) if cycle > Some(140) => {
+                if let Some(program) = member.sampled_program() {
+                    applied[program.index()] += 1;
+                }
+            }
+            _ => {}
+        };
+        simulation.run(60, 200, &mut observe).expect("the cluster gets ready");
+        simulation.go_to(400, 0.0, &mut observe);
+        assert_eq!(simulation.violations(), [], "{order:?}");
+        assert!(applied.iter().all(|applied| *applied > 150), "{applied:?}: {order:?}");
     }
 }

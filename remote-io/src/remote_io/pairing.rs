@@ -93,6 +93,8 @@ pub(super) struct Pairing {
     theirs: Option<Pair>,
     /// Deadlines for which stations are received and this one may not begin.
     refused: u32,
+    /// The operator is asked because it may not begin.
+    asks: bool,
     /// Whether a station that can hold the state was received at the last deadline, as [`Report::is_received`] has it.
     receives_stations: bool,
     /// Where both remote I/Os are wired to the plant.
@@ -175,6 +177,7 @@ impl Pairing {
             partner: Partner { at: now, is_known: false, is_lost: false },
             theirs: None,
             refused: 0,
+            asks: false,
             receives_stations: false,
             modules: Modules::of(of),
         })
@@ -203,7 +206,10 @@ impl Pairing {
             }
             Part::Follower => {
                 let goes_first = !self.is_first() && self.received.is_none();
-                self.part == Part::Follower && goes_first && (theirs.able || !self.able)
+                // One that receives no station, and is received over a direct link, cannot begin.
+                let can_begin =
+                    theirs.able && (theirs.receives_stations || !self.receives_stations);
+                self.part == Part::Follower && goes_first && (can_begin || !self.able)
             }
         }
     }

@@ -102,6 +102,10 @@ impl RemoteIo {
                 pairing.part = Part::TakingOver;
                 pairing.idle = 0;
                 pairing.refused = 0;
+                // Those that were missing have come, so the question is over: what they hold decides.
+                if std::mem::take(&mut pairing.asks) {
+                    self.question = None;
+                }
                 self.connect_field();
                 self.report_part();
             }
@@ -117,13 +121,19 @@ impl RemoteIo {
         }
     }
 
-    /// Stations are received, but one that is not might follow an author that is not received either: the operator decides.
+    /// Stations are received, but one that is not might follow an author that is not received either: the operator decides. The two are not started at one
+    /// time, so the other one has its time to come first.
     fn ask_who_begins(&mut self, refused: u32) {
         let patience = self.settings.agreement.listen_cycles.saturating_mul(5);
         let gone = self.holders.gone_after().max(patience);
-        if refused <= gone || self.question.is_some() {
+        let Some(pairing) = &mut self.pairing else {
+            return;
+        };
+        let is_awaited = !pairing.partner.is_known && !pairing.partner.is_lost;
+        if refused <= gone || is_awaited || self.question.is_some() {
             return;
         }
+        pairing.asks = true;
         let (moment, applied) = (self.moment(), self.newest_applied());
         let newest = self.holders.newest().map(|(from, holding)| (from, holding.stepped));
         let (holder, newest) = newest.unzip();
