@@ -34,6 +34,9 @@ mod reliability;
 mod requirements;
 mod scan;
 mod searches;
+#[allow(dead_code, reason = "each test uses its part")]
+#[path = "../shared/mod.rs"]
+mod shared;
 mod terminal;
 mod twincat;
 mod twins;
