@@ -5,6 +5,7 @@
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use understudy_cluster::value_text;
 use understudy_typed::{Elementary, Point, Points};
 use understudy_wire::Image;
 
@@ -280,25 +281,23 @@ fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
 /// A lane for each point: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
 fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
     let lanes = points.iter().map(|point| {
-        let spans = trace.spans().filter(|(.., image)| image.width() >= points.width());
-        let values: Vec<Step> =
-            spans.map(|(from, to, image)| (from, to, drawn(point, image))).collect();
-        let finite = values.iter().map(|(.., value)| *value);
-        let (low, high) = finite
-            .filter(|value| value.is_finite())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                (low.min(value), high.max(value))
-            });
-        let (name, share): (String, Box<dyn Fn(f64) -> f64>) = match point.of {
-            Elementary::Bool => (point.name.clone(), Box::new(|value| value)),
-            _ if low < high => (
-                format!("{} {} … {}", point.name, short(low), short(high)),
-                Box::new(move |value| ((value - low) / (high - low) * HEIGHTS).round() / HEIGHTS),
-            ),
-            _ if low == high => (format!("{} {}", point.name, short(low)), Box::new(|_| 0.5)),
-            _ => (point.name.clone(), Box::new(|_| 0.5)),
+        let spans = || trace.spans().filter(|(.., image)| image.width() >= points.width());
+        let values = || spans().map(|(from, to, image)| (from, to, point.get(image.words())));
+        let ends = ends(point, values().map(|(.., stored)| stored));
+        let (name, share): (String, Box<dyn Fn(f64) -> f64>) = match ends {
+            _ if point.of == Elementary::Bool => (point.name.clone(), Box::new(|value| value)),
+            Some((low, high)) if height(point, low) < height(point, high) => {
+                let name = format!("{} {} … {}", point.name, text(point, low), text(point, high));
+                let (low, high) = (height(point, low), height(point, high));
+                let share =
+                    move |value: f64| ((value - low) / (high - low) * HEIGHTS).round() / HEIGHTS;
+                (name, Box::new(share))
+            }
+            Some((low, _)) => (format!("{} {}", point.name, text(point, low)), Box::new(|_| 0.5)),
+            None => (point.name.clone(), Box::new(|_| 0.5)),
         };
-        let known = values.into_iter().filter(|(.., value)| value.is_finite());
+        let values = values().map(|(from, to, stored)| (from, to, height(point, stored)));
+        let known = values.filter(|(.., value)| value.is_finite());
         Lane {
             name,
             colour: SIGNAL,
@@ -308,14 +307,32 @@ fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
     lanes.collect()
 }
 
-/// A value as a height; a time in seconds.
-fn drawn(point: &Point, image: &Image) -> f64 {
-    let stored = point.get(image.words());
+/// The least and the greatest of these stored values; nothing where none is a number.
+fn ends(point: &Point, stored: impl Iterator<Item = u64>) -> Option<(u64, u64)> {
+    let finite = stored.filter(|value| height(point, *value).is_finite());
+    finite.fold(None, |ends: Option<(u64, u64)>, value| {
+        let (low, high) = ends.unwrap_or((value, value));
+        let low = if height(point, value) < height(point, low) { value } else { low };
+        let high = if height(point, value) > height(point, high) { value } else { high };
+        Some((low, high))
+    })
+}
+
+/// A stored value as a height.
+fn height(point: &Point, stored: u64) -> f64 {
     match point.of {
         Elementary::Real => f64::from(f32::from_bits(stored as u32)),
         Elementary::Lreal => f64::from_bits(stored),
-        of if of.is_time() => of.signed(stored) as f64 / 1e9,
         of => of.signed(stored) as f64,
+    }
+}
+
+/// A stored value as every view has it; a real with at most four significant digits.
+fn text(point: &Point, stored: u64) -> String {
+    match point.of.is_real() {
+        true => short(height(point, stored)),
+        // A file has some of them in quotes.
+        false => value_text(&point.declared(), stored).replace('"', ""),
     }
 }
 

@@ -115,13 +115,13 @@ fn the_register_map_has_every_signal_once() {
 }
 
 /// A gateway that serves; it is ended with the test.
-struct Gateway {
+pub(crate) struct Gateway {
     child: Child,
     address: SocketAddr,
 }
 
 impl Gateway {
-    fn start(folder: &Path, what: &str) -> Self {
+    pub(crate) fn start(folder: &Path, what: &str) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_understudy"))
             .args(["gateway", what, "runs/latest", "--listen", "127.0.0.1:0"])
             .current_dir(folder)
@@ -137,14 +137,14 @@ impl Gateway {
         Self { child, address }
     }
 
-    fn connect(&self) -> TcpStream {
+    pub(crate) fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a deadline");
         stream
     }
 
     /// It ends in order when it is asked to.
-    fn stop(mut self) {
+    pub(crate) fn stop(mut self) {
         let process = Pid::from_raw(self.child.id() as i32);
         kill(process, Signal::SIGTERM).expect("it runs");
         let status = self.child.wait().expect("it ends");
@@ -229,7 +229,7 @@ fn slow_connections_are_closed_and_others_are_answered() {
 }
 
 /// One request of Modbus TCP; the answer from its function code on.
-fn modbus(stream: &mut TcpStream, request: &[u8]) -> Vec<u8> {
+pub(crate) fn modbus(stream: &mut TcpStream, request: &[u8]) -> Vec<u8> {
     let mut frame = vec![0, 7, 0, 0, 0, request.len() as u8 + 1, 1];
     frame.extend(request);
     stream.write_all(&frame).expect("it takes it");

@@ -34,6 +34,13 @@ mod reliability;
 mod requirements;
 mod scan;
 mod searches;
+#[allow(
+    dead_code,
+    clippy::disallowed_methods,
+    reason = "each test uses its part, by the real clock"
+)]
+#[path = "../shared/mod.rs"]
+mod shared;
 mod terminal;
 mod twincat;
 mod twins;

@@ -176,7 +176,11 @@ fn named(points: &Points, bits: Option<&str>) -> Option<Map<String, Value>> {
 
 #[cfg(test)]
 mod tests {
+    use understudy_journal::Members;
+    use understudy_scenarios::{read, simulate};
+    use understudy_testing::points::{self, POINTS};
     use understudy_typed::Elementary;
+    use understudy_view::{Bounds, Model};
 
     use super::*;
 
@@ -197,5 +201,30 @@ mod tests {
         let found = named(&points, Some("1000000011111111")).map(Value::Object);
         assert_eq!(found, Some(json!({ "a": true, "b": -1 })));
         assert_eq!(named(&points, None), None);
+    }
+
+    /// Operators write each point of the table.
+    #[test]
+    fn a_value_is_what_the_author_of_its_point_declared() {
+        let cluster = points::cluster();
+        let scenario = read("writes.toml", &points::writes(30), Some(&Members::of(&cluster)));
+        let scenario = scenario.scenario.expect("right");
+        let mut model = Model::new(Arc::new(cluster.clone()), Bounds::default());
+        simulate(&cluster, &scenario, 1, &mut |record| model.note(record)).expect("in step");
+        let documents = documents(&cluster, &model.snapshot(), "finished");
+        let (_, program) =
+            documents.iter().find(|(key, _)| key == "programs/one").expect("its document");
+        for row in &POINTS {
+            let expected = match row.of {
+                "BOOL" => json!(row.number != 0),
+                _ if row.is_text() => json!(row.shown),
+                _ => json!(row.number),
+            };
+            for (side, name) in
+                [("inputs", row.name.to_owned()), ("outputs", format!("q{}", row.name))]
+            {
+                assert_eq!(program[side][&name], expected, "{name}");
+            }
+        }
     }
 }

@@ -112,7 +112,7 @@ fn is_of(line: &Line<'_>, name: &str, variable: &str) -> bool {
     let own = behind_unit().unwrap_or(variable);
     let head = name.get(..own.len());
     head.is_some_and(|head| head.eq_ignore_ascii_case(own))
-        && (name.len() == own.len() || name[own.len()..].starts_with('.'))
+        && (name.len() == own.len() || name[own.len()..].starts_with(['.', '[']))
 }
 
 fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec<ShownLine> {
@@ -186,6 +186,7 @@ mod tests {
         let source = SourceText::new("PROGRAM level\n  inlet := level;\nEND_PROGRAM\n");
         let line = &source.lines()[1];
         assert!(is_of(line, "Level", "level") && is_of(line, "level.part", "level"));
+        assert!(is_of(line, "level[2]", "level") && !is_of(line, "levels[2]", "level"));
         assert!(is_of(line, "inlet", "level.inlet"));
         // The program has the name of its variable.
         assert!(!is_of(line, "inlet", "level"));

@@ -79,6 +79,12 @@ impl<'t> SourceText<'t> {
         let mut lines = Vec::new();
         for text in text.lines() {
             let mut names = reader.names_in(text);
+            let stored_to = stored_to(text).unwrap_or_default();
+            for (name, kind) in &mut names {
+                if *kind == Use::Read && stored_to.starts_with(*name) {
+                    *kind = Use::Written;
+                }
+            }
             let mut ends = false;
             for place in 0..names.len() {
                 let name = names[place].0;
@@ -224,9 +230,7 @@ impl Reader {
             } else if first == '\'' || first == '"' {
                 rest = behind_text(&rest[1..], first);
             } else if first.is_ascii_alphanumeric() || first == '_' || first == '%' {
-                let is_part = |letter: char| letter.is_alphanumeric() || "_.#%".contains(letter);
-                let end = rest.find(|letter| !is_part(letter)).unwrap_or(rest.len());
-                let (name, behind) = rest.split_at(end);
+                let (name, behind) = rest.split_at(end_of_name(rest, !self.in_declaration));
                 if !first.is_ascii_digit() && !name.contains('#') {
                     names.push((name.trim_end_matches('.'), self.use_of(name, behind)));
                 }
@@ -272,6 +276,33 @@ impl Reader {
             () => Use::Read,
         }
     }
+}
+
+/// The operand that a line of an instruction list assigns: `q` in `done: ST q`.
+fn stored_to(line: &str) -> Option<&str> {
+    let mut words = line.split_whitespace().skip_while(|word| word.ends_with(':'));
+    let operator = words.next()?;
+    let stores = ["ST", "STN", "S", "R"].into_iter().any(|it| operator.eq_ignore_ascii_case(it));
+    words.next().filter(|_| stores)
+}
+
+/// Where a name ends with its parts and, if it is `indexed`, with the elements that a number chooses: `a.b[2].c`.
+fn end_of_name(text: &str, indexed: bool) -> usize {
+    let is_part = |letter: char| letter.is_alphanumeric() || "_.#%".contains(letter);
+    let end_from = |start: usize| {
+        text[start..].find(|letter| !is_part(letter)).map_or(text.len(), |length| start + length)
+    };
+    let mut end = end_from(0);
+    while indexed
+        && let Some((index, _)) = text[end..].strip_prefix('[').and_then(|it| it.split_once(']'))
+    {
+        let number = index.strip_prefix('-').unwrap_or(index);
+        if number.is_empty() || !number.bytes().all(|digit| digit.is_ascii_digit()) {
+            break;
+        }
+        end = end_from(end + index.len() + 2);
+    }
+    end
 }
 
 /// What follows a text in quotes, from behind the first one on: a quote behind `$` is part of the text.
@@ -322,6 +353,24 @@ mod tests {
         };
         assert_eq!(names(2), ["PROGRAM", "main"]);
         assert_eq!(names(3), ["a.b", "c"]);
+        let list = "PROGRAM one\nLD a\nl: stn b[2]\nS c (* a *)\nEND_PROGRAM\n";
+        let list = SourceText::new(list);
+        let used = list.lines()[1..4].iter().map(|line| line.names[line.names.len() - 1]);
+        let expected = [("a", Use::Read), ("b[2]", Use::Written), ("c", Use::Written)];
+        assert_eq!(used.collect::<Vec<_>>(), expected);
+        let text = "PROGRAM one\nVAR a : ARRAY[0..2] OF BOOL; END_VAR\na[1] := b.c[2].d; a[i] := a[2 + i]; a[ := 0\nEND_PROGRAM\n";
+        assert_eq!(
+            SourceText::new(text).lines()[2].names,
+            [
+                ("a[1]", Use::Written),
+                ("b.c[2].d", Use::Read),
+                ("a", Use::Written),
+                ("i", Use::Read),
+                ("a", Use::Read),
+                ("i", Use::Read),
+                ("a", Use::Read)
+            ]
+        );
         assert_eq!(source.lines()[3].unit, Some("main"));
         assert!(source.lines()[3].is_program && !source.lines()[0].is_program);
         assert!(source.declares("LAG"));

@@ -1,7 +1,8 @@
-//! What the tests of several crates share: the press cell, skipped tests, random numbers, random programs and tables of states.
+//! What the tests of several crates share: the press cell, a point of each kind, skipped tests, random numbers, random programs and tables of states.
 
 mod cells;
 mod folder;
+pub mod points;
 pub mod random;
 pub mod states;
 

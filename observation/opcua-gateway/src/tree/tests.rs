@@ -8,6 +8,7 @@ use understudy_cycle::Mode;
 use understudy_gateway::BOUNDS;
 use understudy_journal::Members;
 use understudy_scenarios::{read as read_scenario, simulate};
+use understudy_testing::points::{self, POINTS};
 use understudy_view::{Model, RunState, Snapshot};
 
 use super::*;
@@ -193,5 +194,41 @@ fn every_signal_has_one_place_and_a_value_of_its_kind() {
             (_, value) => panic!("{}: {value:?}", variable.path()),
         };
         assert!(of_kind);
+    }
+}
+
+/// Operators write each point of the table, and its variables have the type, the value and the names of its declaration.
+#[test]
+fn a_variable_is_what_the_author_of_its_point_declared() {
+    let cluster = points::cluster();
+    let steps = points::writes(60);
+    let steps = steps.split_once("[[step]]").expect("steps").1;
+    let observation = observed(&cluster, &format!("[[step]]{steps}"), 30);
+    let seen = Seen { observation: &observation, feed: Feed::Live };
+    let variables = variables(&cluster);
+    for row in &POINTS {
+        let (kind, value) = match row.is_bool() {
+            true => (Kind::Boolean, Variant::from(row.number != 0)),
+            false => (Kind::Int64, Variant::from(row.number)),
+        };
+        let names: &[&str] = match row.of {
+            "Mode" => &["Off", "", "", "Manual", "", "", "", "Auto"],
+            _ => &[],
+        };
+        for path in ["Inputs/", "Outputs/q"] {
+            let path = format!("Programs/one/{path}{}", row.name);
+            let found = variables.iter().find(|variable| variable.path() == path);
+            let variable = found.unwrap_or_else(|| panic!("no {path}"));
+            let reading = variable.read(&seen);
+            assert_eq!(
+                (variable.kind(), reading.status, reading.value.as_ref()),
+                (kind, GOOD, Some(&value)),
+                "{path}"
+            );
+            assert_eq!(variable.names(), names, "{path}");
+            let is_time = ["TIME", "LTIME", "DATE"].contains(&row.of);
+            assert_eq!(variable.meaning().contains("nanoseconds"), is_time, "{path}");
+            assert_eq!(variable.is_writable(), path.contains("Inputs"), "{path}");
+        }
     }
 }
