@@ -41,10 +41,10 @@ impl PairedInput {
         }
         Some(match (of.is_real(), of.bits()) {
             (true, 32) => {
-                let mean = (real(one, 32) + real(other, 32)) / 2.0;
+                let mean = (of.number(one) + of.number(other)) / 2.0;
                 u64::from((mean as f32).to_bits())
             }
-            (true, _) => (real(one, 64) / 2.0 + real(other, 64) / 2.0).to_bits(),
+            (true, _) => (of.number(one) / 2.0 + of.number(other) / 2.0).to_bits(),
             (false, _) => (of.signed(one) + of.signed(other)).div_euclid(2) as u64 & of.mask(),
         })
     }
@@ -52,7 +52,7 @@ impl PairedInput {
     fn is_within(self, one: u64, other: u64) -> bool {
         let of = self.place.of;
         let difference = if of.is_real() {
-            real(one, of.bits()) - real(other, of.bits())
+            of.number(one) - of.number(other)
         } else {
             (of.signed(one) - of.signed(other)) as f64
         };
@@ -63,13 +63,6 @@ impl PairedInput {
     fn moves(self, before: u64, now: u64) -> bool {
         let of = self.place.of;
         before != now && (of.bits() == 1 || of.is_bit_string() || !self.is_within(before, now))
-    }
-}
-
-fn real(stored: u64, bits: u32) -> f64 {
-    match bits {
-        32 => f64::from(f32::from_bits(stored as u32)),
-        _ => f64::from_bits(stored),
     }
 }
 

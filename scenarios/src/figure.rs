@@ -286,9 +286,9 @@ fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
         let ends = ends(point, values().map(|(.., stored)| stored));
         let (name, share): (String, Box<dyn Fn(f64) -> f64>) = match ends {
             _ if point.of == Elementary::Bool => (point.name.clone(), Box::new(|value| value)),
-            Some((low, high)) if height(point, low) < height(point, high) => {
+            Some((low, high)) if point.of.number(low) < point.of.number(high) => {
                 let name = format!("{} {} … {}", point.name, text(point, low), text(point, high));
-                let (low, high) = (height(point, low), height(point, high));
+                let (low, high) = (point.of.number(low), point.of.number(high));
                 let share =
                     move |value: f64| ((value - low) / (high - low) * HEIGHTS).round() / HEIGHTS;
                 (name, Box::new(share))
@@ -296,7 +296,7 @@ fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
             Some((low, _)) => (format!("{} {}", point.name, text(point, low)), Box::new(|_| 0.5)),
             None => (point.name.clone(), Box::new(|_| 0.5)),
         };
-        let values = values().map(|(from, to, stored)| (from, to, height(point, stored)));
+        let values = values().map(|(from, to, stored)| (from, to, point.of.number(stored)));
         let known = values.filter(|(.., value)| value.is_finite());
         Lane {
             name,
@@ -309,28 +309,19 @@ fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
 
 /// The least and the greatest of these stored values; nothing where none is a number.
 fn ends(point: &Point, stored: impl Iterator<Item = u64>) -> Option<(u64, u64)> {
-    let finite = stored.filter(|value| height(point, *value).is_finite());
+    let finite = stored.filter(|value| point.of.number(*value).is_finite());
     finite.fold(None, |ends: Option<(u64, u64)>, value| {
         let (low, high) = ends.unwrap_or((value, value));
-        let low = if height(point, value) < height(point, low) { value } else { low };
-        let high = if height(point, value) > height(point, high) { value } else { high };
+        let low = if point.of.number(value) < point.of.number(low) { value } else { low };
+        let high = if point.of.number(value) > point.of.number(high) { value } else { high };
         Some((low, high))
     })
-}
-
-/// A stored value as a height.
-fn height(point: &Point, stored: u64) -> f64 {
-    match point.of {
-        Elementary::Real => f64::from(f32::from_bits(stored as u32)),
-        Elementary::Lreal => f64::from_bits(stored),
-        of => of.signed(stored) as f64,
-    }
 }
 
 /// A stored value as every view has it; a real with at most four significant digits.
 fn text(point: &Point, stored: u64) -> String {
     match point.of.is_real() {
-        true => short(height(point, stored)),
+        true => short(point.of.number(stored)),
         // A file has some of them in quotes.
         false => value_text(&point.declared(), stored).replace('"', ""),
     }

@@ -12,7 +12,7 @@ use crate::history::History;
 use crate::model::Model;
 use crate::station::StationState;
 use crate::timeline::Span;
-use crate::value::{is_declared, real, stored_text};
+use crate::value::{is_declared, stored_text};
 
 /// Cycles of one film, at most.
 const MAXIMUM_CYCLES: i64 = 2_000;
@@ -274,7 +274,7 @@ impl Model {
 fn levels(output: &Point, values: Vec<Span<u64>>) -> Output {
     let is_bool = output.of == Elementary::Bool;
     let declared = output.declared();
-    let number = |stored: u64| real(output.of, stored);
+    let number = |stored: u64| output.of.number(stored);
     let mut ordered: Vec<u64> = values.iter().map(|span| span.value).collect();
     ordered.retain(|stored| number(*stored).is_finite());
     ordered.sort_by(|one, other| number(*one).total_cmp(&number(*other)));

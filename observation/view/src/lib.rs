@@ -82,6 +82,6 @@ pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
-pub use value::{forced_point, forced_value, number_of, real, shown, stored, value_of};
+pub use value::{forced_point, forced_value, number_of, shown, stored, value_of};
 pub use why::{Addend, Reason, Reconstructed, Why};
 pub use zone::Zone;

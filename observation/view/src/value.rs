@@ -92,16 +92,7 @@ pub fn number_of(point: &Point, words: &[u64]) -> Value {
 
 /// The same as a real number; not a number where it is none.
 pub(crate) fn real_of(point: &Point, words: &[u64]) -> f64 {
-    real(point.of, point.get(words))
-}
-
-/// A stored value of a type as a real number; not a number where it is none.
-pub fn real(of: Elementary, stored: u64) -> f64 {
-    match of {
-        Elementary::Real => f32::from_bits(stored as u32).into(),
-        Elementary::Lreal => f64::from_bits(stored),
-        of => of.signed(stored) as f64,
-    }
+    point.of.number(point.get(words))
 }
 
 /// The point of a program that is forced; nothing where the program has none of that place and width.

@@ -170,6 +170,15 @@ impl Elementary {
             i128::from(stored)
         }
     }
+
+    /// A stored value as a number: what a REAL or LREAL stands for, and all else as [`Self::signed`]. Not a number where a real is none.
+    pub fn number(self, stored: u64) -> f64 {
+        match self {
+            Self::Real => f32::from_bits(stored as u32).into(),
+            Self::Lreal => f64::from_bits(stored),
+            _ => self.signed(stored) as f64,
+        }
+    }
 }
 
 impl fmt::Display for Elementary {

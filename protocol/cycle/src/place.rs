@@ -43,20 +43,15 @@ impl PointPlace {
     }
 }
 
-/// The number that a stored REAL or LREAL stands for.
-fn real(of: Elementary, stored: u64) -> f64 {
-    if of == Elementary::Real {
-        f32::from_bits(stored as u32).into()
-    } else {
-        f64::from_bits(stored)
-    }
-}
-
 fn is_number(of: Elementary, stored: u64) -> bool {
-    !of.is_real() || real(of, stored).is_finite()
+    !of.is_real() || of.number(stored).is_finite()
 }
 
 /// Whether one value is at most the other.
 pub fn in_order(of: Elementary, one: u64, other: u64) -> bool {
-    if of.is_real() { real(of, one) <= real(of, other) } else { of.signed(one) <= of.signed(other) }
+    if of.is_real() {
+        of.number(one) <= of.number(other)
+    } else {
+        of.signed(one) <= of.signed(other)
+    }
 }

@@ -23,11 +23,8 @@ impl Ramp {
         let of = self.place.of;
         let change = self.step * f64::from(deadlines);
         if of.is_real() {
-            let real = |stored: u64| match of.bits() {
-                32 => f64::from(f32::from_bits(stored as u32)),
-                _ => f64::from_bits(stored),
-            };
-            let (start, way) = (real(from), real(to) - real(from));
+            let (start, end) = (of.number(from), of.number(to));
+            let way = end - start;
             // Also where there is no number to start from.
             if way.is_nan() || way.abs() <= change || !start.is_finite() {
                 return to;

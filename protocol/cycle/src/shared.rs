@@ -62,8 +62,8 @@ impl SharedOutputs {
         whole: impl Iterator<Item = &'a Image> + Clone,
     ) -> bool {
         self.places.iter().all(|place| {
-            let found = number(*place, place.get(found));
-            let mut bounds = whole.clone().map(|image| number(*place, place.get(image)));
+            let found = place.of.number(place.get(found));
+            let mut bounds = whole.clone().map(|image| place.of.number(place.get(image)));
             found == 0.0
                 || bounds
                     .any(|bound| found.signum() == bound.signum() && found.abs() <= bound.abs())
@@ -75,7 +75,7 @@ impl SharedOutputs {
 fn half(place: PointPlace, stored: u64, is_twin: bool) -> u64 {
     let of = place.of;
     if of.is_real() {
-        return real_bits(of, number(place, stored) / 2.0);
+        return real_bits(of, of.number(stored) / 2.0);
     }
     let value = of.signed(stored);
     let of_twin = value / 2;
@@ -86,21 +86,13 @@ fn half(place: PointPlace, stored: u64, is_twin: bool) -> u64 {
 fn add(place: PointPlace, [one, other]: [u64; 2]) -> u64 {
     let of = place.of;
     if of.is_real() {
-        return real_bits(of, number(place, one) + number(place, other));
+        return real_bits(of, of.number(one) + of.number(other));
     }
     let sum = of.signed(one) + of.signed(other);
     // More than the type has is not the remainder of it.
     let most = i128::from(of.mask() >> u32::from(of.is_signed()));
     let least = if of.is_signed() { -most - 1 } else { 0 };
     sum.clamp(least, most) as u64 & of.mask()
-}
-
-fn number(place: PointPlace, stored: u64) -> f64 {
-    match place.of {
-        Elementary::Real => f32::from_bits(stored as u32).into(),
-        Elementary::Lreal => f64::from_bits(stored),
-        of => of.signed(stored) as f64,
-    }
 }
 
 fn real_bits(of: Elementary, value: f64) -> u64 {

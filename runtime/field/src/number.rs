@@ -19,11 +19,11 @@ pub(crate) fn value(
 ) -> Result<u64, NotFinite> {
     let raw = joined(registers, words);
     let stored = if registers.is_scaled() {
-        store(of, number(registers.of, raw) * registers.scale + registers.offset)
+        store(of, registers.of.number(raw) * registers.scale + registers.offset)
     } else {
         convert(registers.of, of, raw)
     };
-    let is_finite = !of.is_real() || number(of, stored).is_finite();
+    let is_finite = !of.is_real() || of.number(stored).is_finite();
     is_finite.then_some(stored).ok_or(NotFinite)
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn words(
     stored: u64,
 ) -> impl Iterator<Item = u16> {
     let raw = if registers.is_scaled() {
-        store(registers.of, (number(of, stored) - registers.offset) / registers.scale)
+        store(registers.of, (of.number(stored) - registers.offset) / registers.scale)
     } else {
         convert(of, registers.of, stored)
     };
@@ -76,18 +76,9 @@ fn convert(from: Elementary, to: Elementary, stored: u64) -> u64 {
     if from == to {
         stored
     } else if from.is_real() || to.is_real() {
-        store(to, number(from, stored))
+        store(to, from.number(stored))
     } else {
         saturated(to, from.signed(stored))
-    }
-}
-
-/// A stored value as LREAL.
-fn number(of: Elementary, stored: u64) -> f64 {
-    match of {
-        Elementary::Real => f64::from(f32::from_bits(stored as u32)),
-        Elementary::Lreal => f64::from_bits(stored),
-        _ => of.signed(stored) as f64,
     }
 }
 
@@ -205,7 +196,7 @@ mod tests {
             prop_assert_eq!(words.len(), usize::from(registers.count()));
             match value(&registers, of, &words) {
                 Ok(read) => prop_assert_eq!(read, stored),
-                Err(NotFinite) => prop_assert!(!number(of, stored).is_finite()),
+                Err(NotFinite) => prop_assert!(!of.number(stored).is_finite()),
             }
         }
     }

@@ -87,10 +87,5 @@ impl Descent {
 }
 
 fn number(ramp: Ramp, image: &Image) -> f64 {
-    let (of, stored) = (ramp.place.of, ramp.place.get(image));
-    match (of.is_real(), of.bits()) {
-        (true, 32) => f64::from(f32::from_bits(stored as u32)),
-        (true, _) => f64::from_bits(stored),
-        (false, _) => of.signed(stored) as f64,
-    }
+    ramp.place.of.number(ramp.place.get(image))
 }

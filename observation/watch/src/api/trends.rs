@@ -13,7 +13,7 @@ use serde_json::Value;
 use understudy_cluster::{AlarmCondition, AlarmDeclaration};
 use understudy_journal::{TimeOfDay, source_word};
 use understudy_typed::Point;
-use understudy_view::{Coarse, StateSignal, Timeline, number_of, real};
+use understudy_view::{Coarse, StateSignal, Timeline, number_of};
 use understudy_wire::{Image, ProgramId};
 
 use super::Answered;
@@ -233,7 +233,7 @@ fn limits(known: &Known, program: ProgramId, point: &Point, is_output: bool) -> 
     });
     let limit = |alarm: &AlarmDeclaration| match alarm.condition {
         AlarmCondition::Above { limit, .. } | AlarmCondition::Below { limit, .. } => {
-            Some(real(point.of, limit))
+            Some(point.of.number(limit))
         }
         AlarmCondition::Is(_) => None,
     };

@@ -22,11 +22,7 @@ pub(crate) fn boundary(of: Elementary, stored: u64, is_included: bool) -> Option
 }
 
 pub(crate) fn real(of: Elementary, stored: u64) -> Option<f64> {
-    match of {
-        Elementary::Real => Some(f64::from(f32::from_bits(stored as u32))),
-        Elementary::Lreal => Some(f64::from_bits(stored)),
-        _ => None,
-    }
+    of.is_real().then(|| of.number(stored))
 }
 
 /// Reals in their order as integers; both zeros are 0.
