@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use serde_json::Value;
-use understudy_typed::{Effect, Program, Trace};
+use understudy_typed::{Effect, Program, Trace, is_within_in_any_case};
 use understudy_wire::ProgramId;
 
 use crate::error::ViewError;
@@ -109,10 +109,7 @@ fn is_of(line: &Line<'_>, name: &str, variable: &str) -> bool {
         let is_own = line.unit.is_some_and(|it| it.eq_ignore_ascii_case(unit));
         is_own.then_some(own)
     };
-    let own = behind_unit().unwrap_or(variable);
-    let head = name.get(..own.len());
-    head.is_some_and(|head| head.eq_ignore_ascii_case(own))
-        && (name.len() == own.len() || name[own.len()..].starts_with(['.', '[']))
+    is_within_in_any_case(name, behind_unit().unwrap_or(variable))
 }
 
 fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec<ShownLine> {

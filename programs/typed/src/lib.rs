@@ -40,7 +40,7 @@ pub use self::form::{
 pub use self::image::{Declared, Point, Points};
 pub use self::interpreter::{Done, Effect, Interpreter, Made, Read, Trace};
 pub use self::machine::{Machine, Scratch};
-pub use self::naming::{Part, Parts, indices, is_within};
+pub use self::naming::{Part, Parts, indices, is_within, is_within_in_any_case};
 pub use self::operation::{
     Comparison, Operand, Operation, RealFunction, Signature, TextOperand, TextOperation,
     text_literal,

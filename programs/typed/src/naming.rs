@@ -12,6 +12,12 @@ pub fn is_within(name: &str, whole: &str) -> bool {
     name.strip_prefix(whole).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
+/// As [`is_within`], in any case of letters.
+pub fn is_within_in_any_case(name: &str, whole: &str) -> bool {
+    let head = name.get(..whole.len());
+    head.is_some_and(|head| head.eq_ignore_ascii_case(whole)) && is_within(&name[whole.len()..], "")
+}
+
 /// A variable without parts, or such a part of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
@@ -198,11 +204,6 @@ impl Program {
     /// The variable or the part of a name, in any case of letters: `level`, `pid.integral`, `table[3]`, or an address such as `%QW4`.
     pub fn part(&self, name: &str) -> Option<Part> {
         let is = |known: &str| known.eq_ignore_ascii_case(name);
-        let begins = |known: &str| {
-            let head = name.get(..known.len());
-            head.is_some_and(|head| head.eq_ignore_ascii_case(known))
-                && name[known.len()..].starts_with(['.', '['])
-        };
         let addressed = |address: &Option<String>| address.as_deref().is_some_and(is);
         let variables = || self.variables.iter();
         // The names of a ladder may differ in their case alone.
@@ -210,7 +211,7 @@ impl Program {
         let other = || variables().find(|known| is(&known.name) || addressed(&known.address));
         let whole = same.or_else(other);
         let within = || {
-            let found = variables().filter(|known| begins(&known.name));
+            let found = variables().filter(|known| is_within_in_any_case(name, &known.name));
             found.max_by_key(|known| (known.name.len(), name.starts_with(&known.name)))
         };
         let variable = whole.or_else(within)?;
