@@ -1,5 +1,6 @@
 //! An online change between two cluster files: what it replaces, and why it needs a stop where it does.
 
+mod differences;
 mod error;
 mod fallback;
 mod plan;
@@ -17,12 +18,12 @@ use understudy_cycle::{
 use understudy_typed::{Fault, Program as TypedProgram, Renamed, Successor};
 use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
+use self::differences::{Difference, Points, differences};
 pub use self::error::ChangeError;
 pub use self::fallback::{ChangedFallback, FallbackText};
 pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_pairs, fates};
 pub use self::points::{ChangedPoints, FixedPoints, change_with_points};
 pub use self::settings::ChangedSetting;
-use self::settings::changed_settings;
 pub use self::unfit::{PairReason, Unfit};
 use crate::cluster::{Cluster, Controller};
 use crate::code::Code;
@@ -174,50 +175,42 @@ impl ChangeTexts {
     /// # Errors
     /// Why it needs a stop.
     pub fn between(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
-        if before.name() != after.name() {
-            let (before, after) = (before.name().to_owned(), after.name().to_owned());
-            return Err(vec![NeedsStop::OtherCluster { before, after }]);
-        }
-        let mut reasons = Vec::new();
-        let changed = changed_settings(&before.frame_text, &after.frame_text);
-        reasons.extend(changed.into_iter().map(NeedsStop::Setting));
-        let pairs = before.controllers().iter().zip(after.controllers());
-        let pairs = pairs.filter(|(old, new)| old.name == new.name);
-        let (mut programs, mut fallbacks) = (Vec::new(), Vec::new());
-        for (place, (old, new)) in (0..).zip(pairs) {
-            let points = Unfit::points(&old.name, &old.code, &new.code);
-            let is_unfit = points.is_some();
-            reasons.extend(points.map(NeedsStop::from));
-            let remote_ios =
-                [before, after].map(|cluster| cluster.remote_ios.get(usize::from(place)));
-            if let ([Some(old), Some(new)], false) = (remote_ios, is_unfit) {
-                match ChangedFallback::between(ProgramId(place), old, new) {
-                    Ok(changed) => fallbacks.extend(changed),
-                    Err(changed) => reasons.push(NeedsStop::Setting(changed)),
-                }
-            }
-            if old.hash != new.hash {
-                let of_program = Unfit::memory(&old.name, &old.code, &new.code).into_iter();
-                let of_program = of_program.chain(Unfit::pairs(&old.name, &old.code, &new.code));
-                reasons.extend(of_program.map(NeedsStop::from));
+        differences(before, after, Points::Stay).map(|found| Self::of(before, after, found))
+    }
+
+    /// The change from one cluster file to another one, in which points may differ.
+    ///
+    /// # Errors
+    /// Why it needs a stop.
+    pub fn with_points(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
+        differences(before, after, Points::MayChange).map(|found| Self::of(before, after, found))
+    }
+
+    fn of(before: &Cluster, after: &Cluster, differences: Vec<Difference>) -> Self {
+        let (mut programs, mut fallbacks, mut points) = (Vec::new(), Vec::new(), Vec::new());
+        for difference in differences {
+            let Difference { program, is_replaced, points: moved, fallback } = difference;
+            let [old, new] = [before, after].map(|cluster| &cluster.controllers[program.index()]);
+            if is_replaced {
                 programs.push(ChangedText {
-                    program: ProgramId(place),
+                    program,
                     before: ProgramText::of(&old.code, old.hash),
                     after: ProgramText::of(&new.code, new.hash),
                 });
             }
+            match moved {
+                // What its remote I/O does is in its section too.
+                Some(_) => points.push(ChangedPoints::between(program, before, after)),
+                None => fallbacks.extend(fallback),
+            }
         }
-        if reasons.is_empty() {
-            Ok(Self {
-                cluster: before.agreement().cluster.0,
-                before: before.agreement().configuration,
-                after: after.agreement().configuration,
-                programs,
-                fallbacks,
-                points: Vec::new(),
-            })
-        } else {
-            Err(reasons)
+        Self {
+            cluster: before.agreement().cluster.0,
+            before: before.agreement().configuration,
+            after: after.agreement().configuration,
+            programs,
+            fallbacks,
+            points,
         }
     }
 

@@ -12,11 +12,8 @@ use understudy_cycle::{
 use understudy_typed::{Declared, Point, Points};
 use understudy_wire::ProgramId;
 
-use super::settings::{ChangedSetting, changed_settings};
 use super::unfit::different_point;
-use super::{
-    Between, ChangeError, ChangeTexts, ChangedFallback, ChangedText, NeedsStop, ProgramText, Unfit,
-};
+use super::{Between, ChangeError, ChangeTexts, Difference, NeedsStop, differences};
 use crate::cluster::{Cluster, Controller};
 use crate::configuration::{FALLBACK, INPUT, input_line};
 use crate::read::{Overrides, read_with};
@@ -34,6 +31,11 @@ pub struct ChangedPoints {
 }
 
 impl ChangedPoints {
+    pub(super) fn between(program: ProgramId, before: &Cluster, after: &Cluster) -> Self {
+        let section = |cluster: &Cluster| cluster.remote_ios[program.index()].section.clone();
+        Self { program, before: section(before), after: section(after) }
+    }
+
     pub(super) fn back(self) -> Self {
         let Self { program, before, after } = self;
         Self { program, before: after, after: before }
@@ -78,97 +80,24 @@ pub fn change_with_points(
     before: &Cluster,
     after: &Cluster,
 ) -> Result<OnlineChange, Vec<NeedsStop>> {
-    if before.name() != after.name() {
-        let (before, after) = (before.name().to_owned(), after.name().to_owned());
-        return Err(vec![NeedsStop::OtherCluster { before, after }]);
-    }
-    let mut reasons = Vec::new();
-    let both = before.controllers.iter().zip(&after.controllers);
-    let replaced =
-        both.clone().zip(&before.remote_ios).filter(|((old, new), _)| old.hash != new.hash);
-    let of_replaced: Vec<String> =
-        replaced.map(|(_, remote_io)| format!("remote I/O `{}`", remote_io.name)).collect();
-    // Where the inputs of a program come from is a part of its points.
-    let is_of_points = |setting: &ChangedSetting| matches!(setting, ChangedSetting::Key { of, key, .. } if key == "`inputs`" && of_replaced.contains(of));
-    let changed = changed_settings(&before.frame_text, &after.frame_text);
-    let others = changed.into_iter().filter(|setting| !is_of_points(setting));
-    reasons.extend(others.map(NeedsStop::Setting));
     let (mut programs, mut fallbacks) = (Vec::new(), Vec::new());
-    for (program, (old, new)) in (0..).map(ProgramId).zip(both) {
-        if old.name != new.name {
-            continue;
+    for difference in differences(before, after, super::Points::MayChange)? {
+        let Difference { program, is_replaced, points, fallback } = difference;
+        if points.is_some() || fallback.is_some() {
+            let settings = |cluster: &Cluster| cluster.remote_ios[program.index()].fallback.clone();
+            let (before, after) = (settings(before), settings(after));
+            fallbacks.push(FallbackChange { program, before, after });
         }
-        let points = points_change(before, after, program);
-        if points.is_some() {
-            let fixed = fixed_points(before, after, program);
-            let program = &old.name;
-            reasons.extend(fixed.map(|why| Unfit::Fixed { program: program.clone(), why }.into()));
-        }
-        let remote_ios = [before, after].map(|cluster| cluster.remote_ios.get(program.index()));
-        if let [Some(one), Some(other)] = remote_ios {
-            match ChangedFallback::between(program, one, other) {
-                Ok(None) if points.is_none() => {}
-                Ok(_) => fallbacks.push(FallbackChange {
-                    program,
-                    before: one.fallback.clone(),
-                    after: other.fallback.clone(),
-                }),
-                Err(changed) => reasons.push(NeedsStop::Setting(changed)),
-            }
-        }
-        if old.hash != new.hash {
-            let unfit = Unfit::memory(&old.name, &old.code, &new.code).into_iter();
-            let unfit = unfit.chain(Unfit::pairs(&old.name, &old.code, &new.code));
-            reasons.extend(unfit.map(NeedsStop::from));
+        if is_replaced {
+            let [old, new] = [before, after].map(|cluster| &cluster.controllers[program.index()]);
             programs.push(program_change(program, (old, new), points));
         }
-    }
-    if !reasons.is_empty() {
-        return Err(reasons);
     }
     let [before, after] = [before, after].map(|cluster| cluster.agreement().configuration);
     Ok(OnlineChange { before, after, programs, fallbacks })
 }
 
 impl ChangeTexts {
-    /// The change from one cluster file to another one, in which points may differ.
-    ///
-    /// # Errors
-    /// Why it needs a stop.
-    pub fn with_points(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
-        let change = change_with_points(before, after)?;
-        let (mut programs, mut fallbacks, mut points) = (Vec::new(), Vec::new(), Vec::new());
-        for program in (0..before.controllers.len()).map(|index| ProgramId(index as u8)) {
-            let place = program.index();
-            let [old, new] = [before, after].map(|cluster| &cluster.controllers[place]);
-            let [one, other] = [before, after].map(|cluster| &cluster.remote_ios[place]);
-            let changed = change.of(program);
-            if changed.is_some() {
-                programs.push(ChangedText {
-                    program,
-                    before: ProgramText::of(&old.code, old.hash),
-                    after: ProgramText::of(&new.code, new.hash),
-                });
-            }
-            if changed.is_some_and(|changed| changed.points.is_some()) {
-                let (before, after) = (one.section.clone(), other.section.clone());
-                points.push(ChangedPoints { program, before, after });
-            } else {
-                let changed = ChangedFallback::between(program, one, other);
-                fallbacks.extend(changed.map_err(|changed| vec![NeedsStop::Setting(changed)])?);
-            }
-        }
-        let cluster = before.agreement().cluster.0;
-        Ok(ChangeTexts {
-            cluster,
-            before: change.before,
-            after: change.after,
-            programs,
-            fallbacks,
-            points,
-        })
-    }
-
     /// The same where points change: each side is read as a cluster.
     pub(super) fn load_with_points(&self, cluster: &Cluster) -> Result<OnlineChange, ChangeError> {
         let own = cluster.agreement().configuration;
@@ -269,7 +198,11 @@ fn program_change(
 }
 
 /// What becomes of the points of a program; nothing where it has the same ones, by name, type and place, and from the same sources.
-fn points_change(before: &Cluster, after: &Cluster, program: ProgramId) -> Option<PointsChange> {
+pub(super) fn points_change(
+    before: &Cluster,
+    after: &Cluster,
+    program: ProgramId,
+) -> Option<PointsChange> {
     let [old, new] = [before, after].map(|cluster| cluster.controllers.get(program.index()));
     let (old, new) = (old?, new?);
     let (old_layout, new_layout) = (before.layout(program)?, after.layout(program)?);
@@ -302,7 +235,7 @@ fn moved(old: &Points, new: &Points) -> Vec<Moved> {
 }
 
 /// Why the points of a program cannot change while it runs.
-fn fixed_points(
+pub(super) fn fixed_points(
     before: &Cluster,
     after: &Cluster,
     program: ProgramId,
