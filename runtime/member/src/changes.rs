@@ -12,7 +12,7 @@ use understudy_bus::{ChangeKeeper, Changes, FoundFile, LoadedPrograms};
 use understudy_cluster::{ChangeError, ChangeTexts, Cluster};
 use understudy_cycle::OnlineChange;
 use understudy_wire::{
-    ChangeName, ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId,
+    ChangeName, ConfigurationHash, Configurations, Member, OrderRefusal, ProgramHash, ProgramId,
 };
 
 use crate::field::Wirings;
@@ -49,7 +49,11 @@ pub(crate) struct StartedChange {
 }
 
 /// What a member has kept of online changes, and what takes the next one; `cluster` is that of its file.
-pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> StartedChange {
+pub(crate) fn started_change(
+    cluster: &Cluster,
+    member: Member,
+    options: &MemberOptions,
+) -> StartedChange {
     let file = options
         .retain
         .as_ref()
@@ -61,7 +65,7 @@ pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> Star
         loaded: None,
         file: file.clone(),
         programs: programs.clone(),
-        wirings: Wirings::default(),
+        wirings: Wirings::new(member),
     };
     let wirings = keeper.wirings.clone();
     let restored = file.as_ref().map_or(Ok(None), |file| keeper.start(file));
@@ -239,9 +243,9 @@ impl ChangeKeeper for Keeper {
     }
 }
 
-/// The places of points before and after a change that replaces some.
+/// The places of points before and after a change that replaces those of the member's program.
 fn learn(wirings: &Wirings, cluster: &Cluster, texts: &ChangeTexts) {
-    if !texts.points.is_empty() {
+    if texts.points.iter().any(|changed| wirings.are_of(changed)) {
         let both = [texts.before, texts.after];
         both.into_iter()
             .filter_map(|it| cluster.changed(texts, it).ok())
@@ -298,7 +302,7 @@ mod tests {
             loaded: None,
             file: file_of,
             programs,
-            wirings: Wirings::default(),
+            wirings: Wirings::new(Member::RemoteIo(ProgramId(0))),
         };
         let restored = keeper.start(file);
         let own = hash(&keeper.cluster);
@@ -343,7 +347,7 @@ mod tests {
         let check = |keeper: &Keeper| {
             for cluster in [&before, &after] {
                 let hash = cluster.controllers()[0].hash;
-                let outputs = keeper.wirings.outputs(ProgramId(0), hash).expect("it is known");
+                let outputs = keeper.wirings.outputs(hash).expect("it is known");
                 let field = cluster.remote_ios()[0].field.as_ref().expect("a device");
                 assert_eq!(outputs, field.outputs);
             }

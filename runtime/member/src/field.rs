@@ -4,18 +4,21 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use understudy_bus::{FieldDriver, Look};
-use understudy_cluster::{Cluster, Side};
+use understudy_cluster::{ChangedPoints, Cluster, Side};
 use understudy_field::{Device, Look as DeviceLook};
-use understudy_wire::{Frame, Image, Moment, ProgramHash, ProgramId};
+use understudy_wire::{Frame, Image, Member, Moment, ProgramHash, ProgramId};
 
 /// Where the points of the versions of one program are in its device, by the changes that its member has loaded. All clones are of one member.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Wirings(Arc<Mutex<Vec<Wiring>>>);
+#[derive(Debug, Clone)]
+pub(crate) struct Wirings {
+    /// Nothing for a member without a device.
+    program: Option<ProgramId>,
+    known: Arc<Mutex<Vec<Wiring>>>,
+}
 
-/// The wiring of one version of a program.
+/// The wiring of one version of the program.
 #[derive(Debug, Clone)]
 struct Wiring {
-    program: ProgramId,
     version: ProgramHash,
     inputs: Side,
     outputs: Side,
@@ -26,48 +29,59 @@ struct Wiring {
 const MOST_WIRINGS: usize = 64;
 
 impl Wirings {
-    /// Learns those of a cluster.
+    /// None are known yet. `member` is that of the process.
+    pub(crate) fn new(member: Member) -> Self {
+        Self { program: member.sampled_program(), known: Arc::default() }
+    }
+
+    /// Whether a change of these points concerns the device.
+    pub(crate) fn are_of(&self, changed: &ChangedPoints) -> bool {
+        self.program == Some(changed.program)
+    }
+
+    /// Learns that of a cluster.
     pub(crate) fn learn(&self, cluster: &Cluster) {
-        let places = (0..).map(ProgramId).zip(cluster.remote_ios()).zip(cluster.controllers());
-        for ((program, remote_io), controller) in places {
-            let Some(field) = &remote_io.field else {
-                continue;
-            };
-            let mut known = self.known();
-            known.retain(|it| (it.program, it.version) != (program, controller.hash));
-            known.push(Wiring {
-                program,
-                version: controller.hash,
-                inputs: field.inputs.clone(),
-                outputs: field.outputs.clone(),
-                fail_safe: remote_io.fallback.fail_safe.clone(),
-            });
-            let more = known.len().saturating_sub(MOST_WIRINGS);
-            known.drain(..more);
-        }
+        let Some(place) = self.program.map(ProgramId::index) else {
+            return;
+        };
+        let places = (cluster.remote_ios().get(place), cluster.controllers().get(place));
+        let (Some(remote_io), Some(controller)) = places else {
+            return;
+        };
+        let Some(field) = &remote_io.field else {
+            return;
+        };
+        let mut known = self.known();
+        known.retain(|it| it.version != controller.hash);
+        known.push(Wiring {
+            version: controller.hash,
+            inputs: field.inputs.clone(),
+            outputs: field.outputs.clone(),
+            fail_safe: remote_io.fallback.fail_safe.clone(),
+        });
+        let more = known.len().saturating_sub(MOST_WIRINGS);
+        known.drain(..more);
     }
 
     /// The wiring of a version.
-    fn of(&self, program: ProgramId, version: ProgramHash) -> Option<Wiring> {
-        let known = self.known();
-        known.iter().find(|it| (it.program, it.version) == (program, version)).cloned()
+    fn of(&self, version: ProgramHash) -> Option<Wiring> {
+        self.known().iter().find(|it| it.version == version).cloned()
     }
 
     /// The places of the outputs of a version.
     #[cfg(test)]
-    pub(crate) fn outputs(&self, program: ProgramId, version: ProgramHash) -> Option<Side> {
-        self.of(program, version).map(|wiring| wiring.outputs)
+    pub(crate) fn outputs(&self, version: ProgramHash) -> Option<Side> {
+        self.of(version).map(|wiring| wiring.outputs)
     }
 
     fn known(&self) -> MutexGuard<'_, Vec<Wiring>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// A device behind a remote I/O, in place of a simulated plant.
 pub(crate) struct Equipment {
     device: Device,
-    program: ProgramId,
     wirings: Wirings,
     /// The version that the device was wired for last, with the number of that wiring.
     wired: (ProgramHash, u64),
@@ -78,13 +92,9 @@ pub(crate) struct Equipment {
 }
 
 impl Equipment {
-    /// Of a program, whose version is the one with this hash.
-    pub(crate) fn new(
-        device: Device,
-        (program, version): (ProgramId, ProgramHash),
-        wirings: Wirings,
-    ) -> Self {
-        Self { device, program, wirings, wired: (version, 0), read_by: version, is_unwired: false }
+    /// Wired for the version of the program with this hash.
+    pub(crate) fn new(device: Device, version: ProgramHash, wirings: Wirings) -> Self {
+        Self { device, wirings, wired: (version, 0), read_by: version, is_unwired: false }
     }
 }
 
@@ -106,8 +116,8 @@ impl FieldDriver for Equipment {
 
     fn lay_out(&mut self, version: ProgramHash) {
         let (before, _) = self.wired;
-        let old = self.wirings.of(self.program, before);
-        let new = self.wirings.of(self.program, version);
+        let old = self.wirings.of(before);
+        let new = self.wirings.of(version);
         self.is_unwired = old.is_none() || new.is_none();
         if let (Some(old), Some(new)) = (old, new) {
             let number = self.device.rewire(&new.inputs, &new.outputs, &old.fail_safe);
@@ -145,8 +155,6 @@ impl FieldDriver for Equipment {
 mod tests {
     use super::*;
 
-    const PROGRAM: ProgramId = ProgramId(0);
-
     /// A cluster whose device takes no connection.
     fn cluster(outputs: &str, places: &str) -> Cluster {
         let text = format!(
@@ -167,7 +175,7 @@ mod tests {
         let fail_safe = remote_io.fallback.fail_safe.clone();
         let device = Device::start(field, fail_safe, Duration::from_millis(10), false);
         let version = cluster.controllers()[0].hash;
-        Equipment::new(device.expect("a thread"), (PROGRAM, version), wirings.clone())
+        Equipment::new(device.expect("a thread"), version, wirings.clone())
     }
 
     #[test]
@@ -175,7 +183,7 @@ mod tests {
         let before = cluster("valve", "valve = \"coil:1\"");
         let after = cluster("lamp, valve", "valve = \"coil:2\", lamp = \"coil:1\"");
         let [old, new] = [&before, &after].map(|it| it.controllers()[0].hash);
-        let wirings = Wirings::default();
+        let wirings = Wirings::new(Member::RemoteIo(ProgramId(0)));
         wirings.learn(&before);
         let mut equipment = equipment(&before, &wirings);
         let lost = Some(Look::Lost("the places of its points are not known".to_owned()));

@@ -63,7 +63,7 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
     let Member::Station(station) = member else {
         return Err(wrong());
     };
-    let started = started_change(cluster, options);
+    let started = started_change(cluster, member, options);
     let cluster = &started.cluster.clone();
     let settings = cluster.station_settings(station, FirstNumbers::now()?.founds);
     let settings = settings.ok_or_else(wrong)?;
@@ -85,7 +85,7 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
 pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), MemberError> {
     let wrong = || wrong_kind(options, "remote I/O", "understudy remote-io");
     let member = find_member(cluster, &options.name)?;
-    let started = started_change(cluster, options);
+    let started = started_change(cluster, member, options);
     let cluster = &started.cluster.clone();
     let settings = match member {
         Member::RemoteIo(program) => cluster.remote_io_settings(program),
@@ -121,7 +121,7 @@ pub fn run_plant(cluster: &Cluster, options: &MemberOptions) -> Result<(), Membe
     let Member::Plant(program) = member else {
         return Err(wrong());
     };
-    let started = started_change(cluster, options);
+    let started = started_change(cluster, member, options);
     let cluster = &started.cluster.clone();
     let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
     let mut machine = PlantMachine::new(settings, Time::default());
@@ -168,7 +168,7 @@ fn field_of(
         Device::start(places, fail_safe.clone(), period, options.real_time)
     };
     let device = device.map_err(MemberError::Device)?;
-    Ok(Box::new(Equipment::new(device, (program, settings.hash), wirings.clone())))
+    Ok(Box::new(Equipment::new(device, settings.hash, wirings.clone())))
 }
 
 fn run<M>(
