@@ -7,8 +7,9 @@ use std::process::{Child, Command};
 use std::sync::Arc;
 
 use understudy::{Answer, Status};
-use understudy_bus::{BusError, Endpoints, Guard, Peer};
+use understudy_bus::{BusError, Endpoints, Guard, Peer, free_addresses};
 use understudy_seal::{ClusterSecret, KEY_BYTES, Opener, Seal, Title};
+use understudy_wire::Member;
 
 /// The name by which this program is the `understudy` command.
 const NAME: &str = "understudy";
@@ -36,6 +37,13 @@ pub(crate) fn understudy_command() -> Result<Command, Answer> {
 /// What the system refused.
 pub(crate) fn refused(what: &'static str) -> impl FnOnce(io::Error) -> BusError {
     move |source| BusError::System { what, source }
+}
+
+/// These members on free ports.
+pub(crate) fn peers_of(members: Vec<Member>) -> io::Result<Vec<Peer>> {
+    let addresses = free_addresses(members.len())?;
+    let peer = |(member, address)| Peer::new(member, format!("{member:?}"), address);
+    Ok(members.into_iter().zip(addresses).map(peer).collect())
 }
 
 /// Keys derived from no secret: the time that they cost is measured.

@@ -28,6 +28,11 @@ pub struct Peer {
 }
 
 impl Peer {
+    /// A member on the first network alone.
+    pub fn new(member: Member, name: String, address: SocketAddr) -> Self {
+        Self { member, name, address, second: None, link: None }
+    }
+
     /// Where to call it: of two addresses the first that takes a call, which is asked only where there are two.
     pub fn call_address(&self) -> SocketAddr {
         let asked = self.second.and_then(|_| self.reachable().ok());
@@ -236,12 +241,9 @@ mod tests {
             .chain((0..2).map(|program| Member::Plant(ProgramId(program))));
         members
             .enumerate()
-            .map(|(place, member)| Peer {
-                member,
-                name: format!("{place}"),
-                address: ([127, 0, 0, 1], 7000 + place as u16).into(),
-                second: None,
-                link: None,
+            .map(|(place, member)| {
+                let address = ([127, 0, 0, 1], 7000 + place as u16).into();
+                Peer::new(member, format!("{place}"), address)
             })
             .collect()
     }

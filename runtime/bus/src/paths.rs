@@ -23,7 +23,7 @@ const TRY_AGAIN_AFTER: Duration = Duration::from_secs(1);
 
 pub(crate) struct Paths {
     address: SocketAddr,
-    /// By index of the path.
+    /// The link of each path, by its index.
     links: [Option<Box<dyn Link>>; Via::ALL.len()],
     is_plugged: [bool; Via::ALL.len()],
     /// Index of the path that is asked first next time, so that a flood on one of them does not hide the others.

@@ -449,13 +449,7 @@ mod tests {
         ];
         let addresses = free_addresses(members.len()).expect("there are ports");
         let peers = members.iter().zip(addresses);
-        let peers = peers.map(|(&member, address)| Peer {
-            member,
-            name: name(member),
-            address,
-            second: None,
-            link: None,
-        });
+        let peers = peers.map(|(&member, address)| Peer::new(member, name(member), address));
         let peers: Vec<Peer> = peers.collect();
         let endpoints = |own| {
             let roster = Roster::new(1, 2, Vec::new());

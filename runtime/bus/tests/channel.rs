@@ -297,8 +297,7 @@ fn an_operator_reaches_a_member_with_an_ipv6_address() {
     let address = found.local_addr().expect("bound");
     drop(found);
     let folder = issued_at(Ipv6Addr::LOCALHOST);
-    let peers =
-        [Peer { member: station(0), name: "robot".into(), address, second: None, link: None }];
+    let peers = [Peer::new(station(0), "robot".into(), address)];
     let endpoint = endpoints(station(0), &peers);
     let hash = endpoint.cluster();
     let running = member_with(endpoint, keys(&folder, "robot"), || Admitted {

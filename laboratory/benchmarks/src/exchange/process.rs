@@ -14,11 +14,11 @@ use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
     BusError, Changes, Clock, Commands, Endpoints, EventSink as _, Journal, LinkKind,
-    MemberSettings, NoField, Noted, Peer, Record, free_addresses, keep_times, zenoh_runtime,
+    MemberSettings, NoField, Noted, Peer, Record, keep_times, zenoh_runtime,
 };
 use understudy_wire::{ClusterHash, ConfigurationHash, Member, ProgramId, Roster, StationId};
 
-use crate::children::{Running, guard, own_command, refused};
+use crate::children::{Running, guard, own_command, peers_of, refused};
 
 use super::meter::{Exchange, Meter};
 use super::pattern::{PROGRAMS, Pattern, STATIONS};
@@ -184,13 +184,5 @@ fn members() -> io::Result<Vec<Peer>> {
     let stations = (0..STATIONS).map(|rank| Member::Station(StationId(rank)));
     let remote_ios = (0..PROGRAMS).map(|program| Member::RemoteIo(ProgramId(program)));
     let members: Vec<Member> = stations.chain(remote_ios).collect();
-    let addresses = free_addresses(members.len())?;
-    let peer = |(member, address)| Peer {
-        member,
-        name: format!("{member:?}"),
-        address,
-        second: None,
-        link: None,
-    };
-    Ok(members.into_iter().zip(addresses).map(peer).collect())
+    peers_of(members)
 }

@@ -12,7 +12,6 @@ use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
     Changes, Commands, Endpoints, LinkKind, MemberSettings, NoField, Noted, Peer, Record,
-    free_addresses,
 };
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with_files};
 use understudy_cycle::Turns;
@@ -21,7 +20,7 @@ use understudy_remote_io::RemoteIo;
 use understudy_wire::{Epoch, Member, Moment, ProgramId, StationId, Time};
 
 use super::observed::{Measured, Observed, Window, stations_of_understudy};
-use crate::children::{Running, guard, own_command, refused};
+use crate::children::{Running, guard, own_command, peers_of, refused};
 
 /// From the start of the processes to their windows.
 const SETTLING: Duration = Duration::from_secs(1);
@@ -179,15 +178,7 @@ fn peers(controllers: usize) -> io::Result<Vec<Peer>> {
     let station = |rank: usize| Member::Station(StationId(rank as u8));
     let remote_ios = (0..controllers).map(|place| Member::RemoteIo(ProgramId(place as u8)));
     let members: Vec<_> = remote_ios.chain((0..=controllers).map(station)).collect();
-    let addresses = free_addresses(members.len())?;
-    let peer = |(member, address)| Peer {
-        member,
-        name: format!("{member:?}"),
-        address,
-        second: None,
-        link: None,
-    };
-    Ok(members.into_iter().zip(addresses).map(peer).collect())
+    peers_of(members)
 }
 
 /// Runs one process of a cluster.

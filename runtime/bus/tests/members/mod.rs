@@ -171,15 +171,7 @@ pub(crate) fn plant(program: u8) -> Member {
 pub(crate) fn peers(members: &[Member]) -> Vec<Peer> {
     let addresses = free_addresses(members.len()).expect("free ports");
     let named = members.iter().zip(addresses);
-    named
-        .map(|(&member, address)| Peer {
-            member,
-            name: format!("{member:?}"),
-            address,
-            second: None,
-            link: None,
-        })
-        .collect()
+    named.map(|(&member, address)| Peer::new(member, format!("{member:?}"), address)).collect()
 }
 
 /// The key of a member, in a cluster whose secret everybody knows.
