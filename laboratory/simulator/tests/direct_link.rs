@@ -2,8 +2,7 @@
 
 mod press_cell;
 
-use std::time::Duration;
-
+use press_cell::{Gap, WIRINGS, Wire, fault};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use understudy_cycle::Mode;
@@ -15,19 +14,12 @@ const ROBOT: ProgramId = ProgramId(0);
 const FIRST: Member = Member::RemoteIo(ROBOT);
 const TWIN: Member = Member::Twin(ROBOT);
 
-type Wire = fn(&mut Parts, u32);
-const WIRINGS: [Wire; 2] = [press_cell::pair, press_cell::pair_parallel];
-
 fn parts(wire: Wire, take_over_after: u32, is_linked: bool) -> Parts {
     let mut parts = press_cell::parts(Mode::Full, 1);
     wire(&mut parts, take_over_after);
     parts.has_two_networks = true;
     parts.direct_links = if is_linked { ProgramSet::first(2) } else { ProgramSet::EMPTY };
     parts
-}
-
-fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
-    Fault { at_cycle, phase, member, action }
 }
 
 /// Both networks fail between the two remote I/Os of the robot.
@@ -52,13 +44,12 @@ fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
     for fault in faults {
         simulation.schedule(*fault);
     }
-    let (mut last, mut longest) = (None::<Time>, Duration::ZERO);
-    let mut partner_lost = Vec::new();
+    let (mut gap, mut partner_lost) = (Gap::default(), Vec::new());
     let mut observe = |now: Time, cycle: Option<u64>, member: Member, record: Record<'_>| match (
         cycle, member, record,
     ) {
         (Some(_), Member::Plant(ROBOT), Record::Plant(..)) => {
-            longest = longest.max(now.since(last.replace(now).unwrap_or(now)));
+            gap.driven(now);
         }
         (Some(cycle), FIRST | TWIN, Record::RemoteIo(Event::PartnerLost { .. })) => {
             partner_lost.push(cycle);
@@ -68,9 +59,7 @@ fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
     simulation.run(0, 200, &mut observe).expect("the cluster gets ready");
     simulation.go_to(cycles, 0.0, &mut observe);
     assert_eq!(simulation.violations(), []);
-    let end = last.map_or(Duration::MAX, |last| simulation.now().since(last));
-    let longest = longest.max(end.saturating_sub(press_cell::PERIOD));
-    let gap = (longest.as_secs_f64() / press_cell::PERIOD.as_secs_f64()).round() as u64 - 1;
+    let gap = u64::from(gap.periods_until(simulation.now()));
     let tally = &simulation.tallies()[ROBOT.index()];
     let held = gap + tally.held + tally.fail_safe;
     Outcome { simulation, held, partner_lost }

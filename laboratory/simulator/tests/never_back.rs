@@ -5,19 +5,16 @@
 
 mod press_cell;
 
+use press_cell::fault;
 use understudy_cycle::Mode;
 use understudy_remote_io::{Event, LackingReason, StaleState};
-use understudy_simulator::{Action, Fault, Network, Record, Simulation};
+use understudy_simulator::{Action, Network, Record, Simulation};
 use understudy_wire::{Member, ProgramId, Source, StateChoice, StationId};
 
 const PROGRAMS: u8 = 2;
 const UNDERSTUDY: StationId = StationId(PROGRAMS);
 const STATIONS: u8 = PROGRAMS + 1;
 const ROBOT_IO: Member = Member::RemoteIo(ProgramId(0));
-
-fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
-    Fault { at_cycle, phase, member, action }
-}
 
 fn station(rank: u8) -> Member {
     Member::Station(StationId(rank))

@@ -2,14 +2,13 @@
 
 mod press_cell;
 
-use std::time::Duration;
-
+use press_cell::{Gap, WIRINGS, Wire, applies_proved, fault};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use understudy_cycle::Mode;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
-use understudy_wire::{Member, ProgramId, ProgramSet, Source, StateChoice, StationId, Time};
+use understudy_wire::{Member, ProgramId, ProgramSet, StateChoice, StationId};
 
 const ROBOT: ProgramId = ProgramId(0);
 const FIRST: Member = Member::RemoteIo(ROBOT);
@@ -36,29 +35,18 @@ fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
     for fault in faults {
         simulation.schedule(*fault);
     }
-    let mut last: Option<Time> = None;
-    let mut longest = Duration::ZERO;
+    let mut gap = Gap::default();
     let outcome = simulation.run(cycles, 200, &mut |now, cycle, member, record| {
         if cycle.is_some() && member == Member::Plant(ROBOT) && matches!(record, Record::Plant(..))
         {
-            if let Some(last) = last {
-                longest = longest.max(now.since(last));
-            }
-            last = Some(now);
+            gap.driven(now);
         }
     });
     outcome.expect("the cluster gets ready");
     assert_eq!(simulation.violations(), []);
-    let end = last.map_or(Duration::MAX, |last| simulation.now().since(last));
-    let longest = longest.max(end.saturating_sub(press_cell::PERIOD));
-    let gap = longest.as_secs_f64() / press_cell::PERIOD.as_secs_f64();
     let tally = &simulation.tallies()[ROBOT.index()];
     let missed = tally.held + tally.fail_safe;
-    Outcome { gap: gap.round() as u32 - 1, missed, simulation }
-}
-
-fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
-    Fault { at_cycle, phase, member, action }
+    Outcome { gap: gap.periods_until(simulation.now()), missed, simulation }
 }
 
 /// At each tenth of a cycle and for each `take_over_after`: the outputs stay for as many cycles and one more, and nothing wrong is driven.
@@ -188,44 +176,59 @@ fn the_station_that_was_lost_with_the_author_answers_nothing() {
     assert_eq!((simulation.asking(), simulation.author(ROBOT)), (ProgramSet::EMPTY, Some(TWIN)));
 }
 
-/// After a power failure one of the two and one station stay away, or return with a wrong program: nobody knows whether that station follows that one. The
-/// remote I/O that is alone starts, or says why it does not, and then starts as the operator chooses.
+const STATIONS: [Member; 3] =
+    [Member::Station(StationId(0)), Member::Station(StationId(1)), Member::Station(StationId(2))];
+
+/// The cell with twins, all of whose members fail in cycle 50 and return as is told; it is ready before.
+fn after_power_failure(
+    (wire, take_over_after): (Wire, u32),
+    (seed, phase): (u64, f64),
+    mut returns: impl FnMut(Member) -> Option<(u64, f64, Action)>,
+) -> Simulation {
+    let mut parts = press_cell::parts(Mode::Full, 1);
+    wire(&mut parts, take_over_after);
+    let mut simulation = Simulation::new(parts, Network::default(), seed);
+    let pairs = [ROBOT, ProgramId(1)].map(|it| [Member::RemoteIo(it), Member::Twin(it)]);
+    for member in STATIONS.into_iter().chain(pairs.concat()) {
+        simulation.schedule(fault(50, phase, member, Action::Crash));
+        if let Some((at, phase, action)) = returns(member) {
+            simulation.schedule(fault(at, phase, member, action));
+        }
+    }
+    simulation.run(0, 200, &mut |_, _, _, _| {}).expect("the cluster gets ready");
+    simulation
+}
+
+/// Each wiring, with one of the two remote I/Os of the robot and one station.
+fn with_one_of_each() -> impl Iterator<Item = (Wire, [Member; 2])> {
+    let wired = WIRINGS.into_iter().flat_map(|wire| [FIRST, TWIN].map(|one| (wire, one)));
+    wired.flat_map(|(wire, one)| STATIONS.map(|station| (wire, [one, station])))
+}
+
+/// After a power failure one of the two and one station stay away, or return with a wrong program: no member knows whether that station follows that one.
+/// The remote I/O that is alone starts, or says why it does not, and then starts as the operator chooses.
 #[test]
 fn one_that_returns_with_a_part_of_the_stations_can_be_started() {
-    let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
-    let programs = [ROBOT, ProgramId(1)];
-    let pairs = programs.map(|program| [Member::RemoteIo(program), Member::Twin(program)]);
-    let wirings: [fn(&mut Parts, u32); 2] = [press_cell::pair, press_cell::pair_parallel];
-    let cases = wirings.into_iter().flat_map(|wire| [FIRST, TWIN].map(|away| (wire, away)));
-    let cases = cases.flat_map(|(wire, away)| stations.map(|station| (wire, [away, station])));
-    for ((wire, away), place) in cases.flat_map(|case| (0..4).map(move |place| (case, place))) {
+    let cases = with_one_of_each().flat_map(|case| (0..4).map(move |place| (case, place)));
+    for ((wire, away), place) in cases {
         for returns in [None, Some(Action::RestartWrongProgram)] {
             let phase = f64::from(place) * 0.3;
-            let mut parts = press_cell::parts(Mode::Full, 1);
-            wire(&mut parts, 1);
-            let mut simulation = Simulation::new(parts, Network::default(), 1);
-            for member in stations.into_iter().chain(pairs.concat()) {
-                simulation.schedule(fault(50, phase, member, Action::Crash));
+            let mut simulation = after_power_failure((wire, 1), (1, phase), |member| {
                 let action = if away.contains(&member) { returns } else { Some(Action::Restart) };
-                if let Some(action) = action {
-                    simulation.schedule(fault(60, phase, member, action));
-                }
-            }
+                action.map(|action| (60, phase, action))
+            });
             let alone = if away[0] == FIRST { TWIN } else { FIRST };
             let (mut is_told, mut applied) = (false, [0; 2]);
             let mut observe = |_, cycle, member, record: Record<'_>| match record {
+                _ if member != alone => {}
                 Record::RemoteIo(
                     Event::StateLost { asks: true, .. } | Event::ConfigurationDisputed { .. },
-                ) if member == alone => is_told = true,
-                Record::RemoteIo(Event::Applied {
-                    source: Source::Direct | Source::Reconstructed,
-                    ..
-                }) if member == alone && cycle > Some(60) => {
+                ) => is_told = true,
+                record if applies_proved(&record) && cycle > Some(60) => {
                     applied[usize::from(cycle > Some(700))] += 1;
                 }
                 _ => {}
             };
-            simulation.run(60, 200, &mut observe).expect("the cluster gets ready");
             simulation.go_to(700, 0.0, &mut observe);
             let choice = StateChoice::Cold;
             simulation.schedule(fault(700, 0.5, alone, Action::Choose { choice }));
@@ -238,33 +241,21 @@ fn one_that_returns_with_a_part_of_the_stations_can_be_started() {
     }
 }
 
-/// After a power failure one of the two and one station return later than the other ones: all start by themselves, also where the operator was asked meanwhile.
+/// After a power failure one of the two and one station return later than the other ones: all start by themselves, also where the operator was asked
+/// meanwhile.
 #[test]
 fn members_that_return_one_after_another_start_by_themselves() {
-    let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
-    let pairs = [ROBOT, ProgramId(1)].map(|it| [Member::RemoteIo(it), Member::Twin(it)]);
-    let wirings: [fn(&mut Parts, u32); 2] = [press_cell::pair, press_cell::pair_parallel];
-    let cases = wirings.into_iter().flat_map(|wire| [FIRST, TWIN].map(|late| (wire, late)));
-    let cases = cases.flat_map(|(wire, late)| stations.map(|station| (wire, [late, station])));
-    for ((wire, late), later) in cases.flat_map(|case| [10, 30, 100, 600].map(|it| (case, it))) {
-        let mut parts = press_cell::parts(Mode::Full, 1);
-        wire(&mut parts, 1);
-        let mut simulation = Simulation::new(parts, Network::default(), later);
-        for member in stations.into_iter().chain(pairs.concat()) {
-            simulation.schedule(fault(50, 0.3, member, Action::Crash));
-            let returns = if late.contains(&member) { 60 + later } else { 60 };
-            simulation.schedule(fault(returns, 0.7, member, Action::Restart));
-        }
+    let cases = with_one_of_each().flat_map(|case| [10, 30, 100, 600].map(|later| (case, later)));
+    for ((wire, late), later) in cases {
+        let mut simulation = after_power_failure((wire, 1), (later, 0.3), |member| {
+            let at = if late.contains(&member) { 60 + later } else { 60 };
+            Some((at, 0.7, Action::Restart))
+        });
         let mut applied = 0;
-        let mut observe = |_, cycle, member, record: Record<'_>| match record {
-            Record::RemoteIo(Event::Applied {
-                source: Source::Direct | Source::Reconstructed,
-                ..
-            }) if [FIRST, TWIN].contains(&member) && cycle > Some(60 + later) => applied += 1,
-            _ => {}
-        };
-        simulation.run(60, 200, &mut observe).expect("the cluster gets ready");
-        simulation.go_to(260 + later, 0.0, &mut observe);
+        simulation.go_to(260 + later, 0.0, &mut |_, cycle, member, record| {
+            let is_late = [FIRST, TWIN].contains(&member) && cycle > Some(60 + later);
+            applied += u32::from(is_late && applies_proved(&record));
+        });
         let case = format!("{late:?} return {later} cycles later");
         assert_eq!(simulation.violations(), [], "{case}");
         assert!(applied > 100, "{case}: {applied}");
@@ -275,34 +266,22 @@ fn members_that_return_one_after_another_start_by_themselves() {
 #[test]
 fn members_that_return_in_any_order_start_by_themselves() {
     let mut random = Pcg64Mcg::seed_from_u64(36);
-    let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
-    let pairs = [ROBOT, ProgramId(1)].map(|it| [Member::RemoteIo(it), Member::Twin(it)]);
-    let wirings: [fn(&mut Parts, u32); 2] = [press_cell::pair, press_cell::pair_parallel];
     for seed in 0..60 {
-        let mut parts = press_cell::parts(Mode::Full, 1);
-        wirings[seed as usize % 2](&mut parts, random.random_range(1..=3));
-        let mut simulation = Simulation::new(parts, Network::default(), seed);
         let mut order = Vec::new();
-        for member in stations.into_iter().chain(pairs.concat()) {
-            simulation.schedule(fault(50, 0.3, member, Action::Crash));
+        let wiring = (WIRINGS[seed as usize % 2], random.random_range(1..=3));
+        let mut simulation = after_power_failure(wiring, (seed, 0.3), |member| {
             let (at, phase) = (random.random_range(60..140), random.random_range(0.0..1.0));
-            simulation.schedule(fault(at, phase, member, Action::Restart));
             order.push((member, at));
-        }
+            Some((at, phase, Action::Restart))
+        });
         let mut applied = [0; 2];
-        let mut observe = |_, cycle, member: Member, record: Record<'_>| match record {
-            Record::RemoteIo(Event::Applied {
-                source: Source::Direct | Source::Reconstructed,
-                ..
-            }) if cycle > Some(140) => {
-                if let Some(program) = member.sampled_program() {
-                    applied[program.index()] += 1;
-                }
+        simulation.go_to(400, 0.0, &mut |_, cycle, member, record| {
+            if let Some(program) = member.sampled_program()
+                && cycle > Some(140)
+            {
+                applied[program.index()] += u32::from(applies_proved(&record));
             }
-            _ => {}
-        };
-        simulation.run(60, 200, &mut observe).expect("the cluster gets ready");
-        simulation.go_to(400, 0.0, &mut observe);
+        });
         assert_eq!(simulation.violations(), [], "{order:?}");
         assert!(applied.iter().all(|applied| *applied > 150), "{applied:?}: {order:?}");
     }

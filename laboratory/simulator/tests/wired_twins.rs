@@ -2,6 +2,7 @@
 
 mod press_cell;
 
+use press_cell::Gap;
 use understudy_cycle::Mode;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
@@ -43,13 +44,12 @@ fn run(parts: Parts, faults: &[Fault], stuck: &[Stuck], cycles: u64) -> Outcome 
         };
         simulation.schedule(fault(*cycle, 0.0, *member, action));
     }
-    let mut last: Option<Time> = None;
-    let (mut told, mut longest) = (Vec::new(), std::time::Duration::ZERO);
+    let (mut told, mut gap) = (Vec::new(), Gap::default());
     let mut observe = |now: Time, cycle: Option<u64>, member: Member, record: Record<'_>| match (
         cycle, member, record,
     ) {
         (Some(_), Member::Plant(ROBOT), Record::Plant(..)) => {
-            longest = longest.max(now.since(last.replace(now).unwrap_or(now)));
+            gap.driven(now);
         }
         (Some(cycle), FIRST | TWIN, Record::RemoteIo(event)) => {
             let is_of_inputs = matches!(
@@ -68,10 +68,9 @@ fn run(parts: Parts, faults: &[Fault], stuck: &[Stuck], cycles: u64) -> Outcome 
     simulation.run(0, 200, &mut observe).expect("the cluster gets ready");
     simulation.go_to(cycles, 0.0, &mut observe);
     assert_eq!(simulation.violations(), []);
-    let gap = longest.as_secs_f64() / press_cell::PERIOD.as_secs_f64();
     let tally = &simulation.tallies()[ROBOT.index()];
     let missed = tally.held + tally.fail_safe;
-    Outcome { gap: gap.round() as u32 - 1, missed, told, simulation }
+    Outcome { gap: gap.periods(), missed, told, simulation }
 }
 
 fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {

@@ -2,6 +2,7 @@
 
 mod press_cell;
 
+use press_cell::{WIRINGS, Wire, fault};
 use understudy_cycle::Mode;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation, Violation};
@@ -11,9 +12,6 @@ const ROBOT: ProgramId = ProgramId(0);
 const FIRST: Member = Member::RemoteIo(ROBOT);
 const TWIN: Member = Member::Twin(ROBOT);
 const CONTROLLER: Member = Member::Station(StationId(0));
-
-type Wire = fn(&mut Parts, u32);
-const WIRINGS: [Wire; 2] = [press_cell::pair, press_cell::pair_parallel];
 
 /// What is done, in which cycle and where in it, and to whom.
 type Step = (u64, f64, Member, Action);
@@ -36,7 +34,7 @@ fn run(parts: Parts, steps: &[Step], cycles: u64) -> Outcome {
     let mut simulation = Simulation::new(parts, Network::default(), 1);
     let first = steps.iter().map(|step| step.0).min().unwrap_or(0);
     for &(at_cycle, phase, member, action) in steps {
-        simulation.schedule(Fault { at_cycle, phase, member, action });
+        simulation.schedule(fault(at_cycle, phase, member, action));
     }
     let (mut has_wrong, mut wrong, mut right) = ([false; 2], 0, [0; 2]);
     let place = |member| [FIRST, TWIN].iter().position(|it| *it == member);

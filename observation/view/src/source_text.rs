@@ -8,7 +8,7 @@ use understudy_interchange::Listing;
 #[derive(Debug, Clone)]
 pub(crate) struct SourceText<'t> {
     lines: Vec<Line<'t>>,
-    /// Of a file that is no text.
+    /// The listing that this text is of, where the file has another form.
     listing: Option<&'t Listing>,
 }
 

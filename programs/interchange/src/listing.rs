@@ -16,9 +16,9 @@ use crate::typed_text::parsed;
 #[derive(Debug, Clone)]
 pub struct Listing {
     text: String,
-    /// By lines of the file.
+    /// The statements of each line of the file.
     by_file: BTreeMap<u32, Statements>,
-    /// By lines of the listing: the line of the file.
+    /// The line of the file of each line of the listing.
     by_line: BTreeMap<u32, u32>,
 }
 

@@ -310,7 +310,7 @@ impl<'f> Writer<'f> {
         }
         if !self.refused.is_empty() {
             let unit = self.unit;
-            // In the order of the file.
+            // Findings have the order of the file.
             self.refused.sort_by_key(|refused| refused.span.start);
             let more = self.refused.len().saturating_sub(MAXIMUM_REFUSED);
             self.refused.truncate(MAXIMUM_REFUSED);

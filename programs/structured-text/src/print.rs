@@ -70,7 +70,7 @@ const INDENT: usize = 4;
 struct Printer {
     text: String,
     depth: usize,
-    /// Of [`Placed`].
+    /// The places of the statements, as [`Placed`] has them.
     places: Vec<(Span, usize)>,
 }
 

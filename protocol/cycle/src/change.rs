@@ -125,7 +125,7 @@ impl OnlineChange {
         self.of(program)?.passage(from, to)
     }
 
-    /// The layout of a version of a program; nothing where the change does not replace its points, or the version is none of the two.
+    /// The layout of a version of a program; nothing where the change does not replace its points, or has no such version.
     pub fn layout(&self, program: ProgramId, version: ProgramHash) -> Option<&Arc<Layout>> {
         let changed = self.of(program)?;
         let points = changed.points.as_ref()?;

@@ -210,7 +210,7 @@ impl Opener {
 impl Sender {
     fn take(&mut self, via: Via, envelope: Envelope) -> Result<(), Refusal> {
         let Envelope { sender, life, number, .. } = envelope;
-        // What a path carries is judged before what counts: its copy is none of the others'.
+        // What a path carries is judged before what counts: its copy is not one of the others'.
         let is_new_here = self.carried[via.index()].take(life, number) == Verdict::Taken;
         match self.accepted.take(life, number) {
             Verdict::Taken => Ok(()),

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Values of points that stay go with them, by name and type ([`understudy_cycle::Passage`]). Forces end. A history of which it is not known what its
-//! points are is not sampled: nobody could tell what a bit of it means.
+//! points are is not sampled: no member could tell what a bit of it means.
 
 use std::sync::Arc;
 

@@ -55,24 +55,13 @@ fn number() -> Circuit {
 
 /// [`program`] with the output negated, and with one more register that is set.
 fn changed() -> Circuit {
-    let mut builder = CircuitBuilder::new("program");
-    let u = builder.input("u");
-    let (older, was) = builder.register("x1", false);
-    let (newer, is) = builder.register("x0", true);
-    let (more, set) = builder.register("x2", false);
-    let mixed = builder.graph().xor(was, u);
-    builder.set_next(newer, mixed);
-    builder.set_next(older, is);
-    builder.set_next(more, set);
-    let negated = builder.graph().xor(mixed, set);
-    builder.output("y", negated);
-    builder.finish().expect("a circuit")
+    negated(false)
 }
 
-/// [`changed`] with one more input and one more output, which are the first ones: each point of before has another place.
-fn with_more_points() -> Circuit {
+/// [`changed`], and where it has more points one more input and one more output, which are the first ones: each point of before has another place.
+fn negated(has_more_points: bool) -> Circuit {
     let mut builder = CircuitBuilder::new("program");
-    let v = builder.input("v");
+    let v = has_more_points.then(|| builder.input("v"));
     let u = builder.input("u");
     let (older, was) = builder.register("x1", false);
     let (newer, is) = builder.register("x0", true);
@@ -82,8 +71,10 @@ fn with_more_points() -> Circuit {
     builder.set_next(older, is);
     builder.set_next(more, set);
     let negated = builder.graph().xor(mixed, set);
-    let other = builder.graph().xor(is, v);
-    builder.output("w", other);
+    if let Some(v) = v {
+        let other = builder.graph().xor(is, v);
+        builder.output("w", other);
+    }
     builder.output("y", negated);
     builder.finish().expect("a circuit")
 }
@@ -186,7 +177,7 @@ pub(crate) fn repointing() -> Parts {
     let place = |bit| PointPlace { bit, of: Elementary::Bool };
     let moved = vec![Moved { before: place(0), after: place(1) }];
     let program = &mut change.programs[0];
-    program.after.executable = (&with_more_points()).into();
+    program.after.executable = (&negated(true)).into();
     program.points = Some(Arc::new(PointsChange {
         before: Arc::clone(&parts.remote_ios[0].layout),
         after: Arc::new(Layout::booleans(2, 2)),

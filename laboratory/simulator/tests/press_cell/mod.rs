@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Mode, Turns};
-use understudy_remote_io::{PairSettings, PairedInput, Wiring};
-use understudy_simulator::Parts;
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_remote_io::{Event, PairSettings, PairedInput, Wiring};
+use understudy_simulator::{Action, Fault, Parts, Record};
+use understudy_wire::{Member, ProgramId, Source, StationId, Time};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 pub(crate) const HOLD_CYCLES: u32 = 3;
@@ -36,6 +36,48 @@ pub(crate) fn pair(parts: &mut Parts, take_over_after: u32) {
 pub(crate) fn pair_parallel(parts: &mut Parts, take_over_after: u32) {
     let wiring = Wiring::Parallel { discrepancy_cycles: DISCREPANCY_CYCLES };
     pair_as(parts, PairSettings { wiring, ..PairSettings::exclusive(take_over_after) });
+}
+
+/// How the two remote I/Os of each program are wired.
+pub(crate) type Wire = fn(&mut Parts, u32);
+pub(crate) const WIRINGS: [Wire; 2] = [pair, pair_parallel];
+
+pub(crate) fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
+    Fault { at_cycle, phase, member, action }
+}
+
+/// Whether outputs of its program are applied that are proved.
+pub(crate) fn applies_proved(record: &Record<'_>) -> bool {
+    let Record::RemoteIo(Event::Applied { source, .. }) = record else { return false };
+    matches!(source, Source::Direct | Source::Reconstructed)
+}
+
+/// The longest time in which the outputs of a program were not driven.
+#[derive(Default)]
+pub(crate) struct Gap {
+    last: Option<Time>,
+    longest: Duration,
+}
+
+impl Gap {
+    /// They are driven.
+    pub(crate) fn driven(&mut self, now: Time) {
+        let last = self.last.replace(now).unwrap_or(now);
+        self.longest = self.longest.max(now.since(last));
+    }
+
+    /// In periods in a row, up to the last time that they were driven.
+    pub(crate) fn periods(&self) -> u32 {
+        let periods = self.longest.as_secs_f64() / PERIOD.as_secs_f64();
+        periods.round() as u32 - 1
+    }
+
+    /// The same up to `end`.
+    pub(crate) fn periods_until(mut self, end: Time) -> u32 {
+        let since = self.last.map_or(Duration::MAX, |last| end.since(last));
+        self.longest = self.longest.max(since.saturating_sub(PERIOD));
+        self.periods()
+    }
 }
 
 /// The same stations and remote I/Os with these turns.
