@@ -13,7 +13,7 @@ use understudy_wire::{
     WriteRefusal,
 };
 
-pub use self::reason::{AskReason, Lacking, LackingReason, Missing, OldInputs};
+pub use self::reason::{AskReason, Lacking, LackingReason, Missing, OldInputs, PartnerLack};
 
 /// Event of a remote I/O.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -387,10 +387,13 @@ pub enum Event {
         /// Its part.
         part: Part,
     },
-    /// The other remote I/O of the program is not received any more.
+    /// The other remote I/O of the program could not take over any more.
     PartnerLost {
         /// Current cycle.
         moment: Moment,
+        /// Why it could not.
+        #[serde(default)]
+        lack: PartnerLack,
     },
     /// The other remote I/O of the program is received again.
     PartnerReceived {

@@ -140,7 +140,7 @@ impl InputReports {
 
 #[cfg(test)]
 mod tests {
-    use understudy_remote_io::PointPlace;
+    use understudy_remote_io::{PartnerLack, PointPlace};
     use understudy_typed::Elementary;
     use understudy_wire::{Lineage, Moment, ProgramId};
 
@@ -195,7 +195,7 @@ mod tests {
         let excluded = Event::InputExcluded { moment, input: 0, at: TWIN };
         let other = Event::InputsDiffer { moment, input: 1 };
         let agree = Event::InputsAgree { moment, input: 0 };
-        let lost = Event::PartnerLost { moment };
+        let lost = Event::PartnerLost { moment, lack: PartnerLack::Silent };
         let back = Event::PartnerReceived { moment };
         let author = Event::PartChanged { moment, part: Part::Author };
         check(&[], Some(11));

@@ -6,7 +6,7 @@ use press_cell::{Gap, WIRINGS, Wire, fault};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use understudy_cycle::Mode;
-use understudy_remote_io::Event;
+use understudy_remote_io::{Event, PartnerLack};
 use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
 use understudy_wire::{Member, ProgramId, ProgramSet, StationId, Time, Via};
 
@@ -35,8 +35,8 @@ struct Outcome {
     simulation: Simulation,
     /// Periods in which the outputs of the robot were not driven, in a row, and deadlines at which nothing was proved.
     held: u64,
-    /// The cycles in which the two remote I/Os did not receive each other any more, as they report.
-    partner_lost: Vec<u64>,
+    /// Why the other one could not take over, as the two remote I/Os report, the first report first.
+    partner_lost: Vec<PartnerLack>,
 }
 
 fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
@@ -51,8 +51,8 @@ fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
         (Some(_), Member::Plant(ROBOT), Record::Plant(..)) => {
             gap.driven(now);
         }
-        (Some(cycle), FIRST | TWIN, Record::RemoteIo(Event::PartnerLost { .. })) => {
-            partner_lost.push(cycle);
+        (Some(_), FIRST | TWIN, Record::RemoteIo(Event::PartnerLost { lack, .. })) => {
+            partner_lost.push(*lack);
         }
         _ => {}
     };
@@ -182,6 +182,27 @@ fn a_link_that_fails_costs_no_cycle() {
         faults.push(fault(100, 0.3, member, Action::Unplug { network }));
         let outcome = run(parts(press_cell::pair, 1, true), &faults, 300);
         assert_eq!(outcome.partner_lost.len(), 2);
+    }
+}
+
+/// The follower loses all networks, and the author receives it over the link: it could not take over, and the author says so, once, until it can again.
+#[test]
+fn a_follower_that_receives_no_station_is_reported_as_lost() {
+    for wire in WIRINGS {
+        for tenth in 0..10 {
+            let phase = f64::from(tenth) / 10.0;
+            let network = |network| fault(100, phase, TWIN, Action::Unplug { network });
+            let mut faults = Via::NETWORKS.map(network).to_vec();
+            let outcome = run(parts(wire, 1, true), &faults, 300);
+            assert_eq!((outcome.held, outcome.partner_lost), (0, vec![PartnerLack::Stations]));
+            let network = |network| fault(200, phase, TWIN, Action::Plug { network });
+            faults.extend(Via::NETWORKS.map(network));
+            faults.push(fault(300, phase, FIRST, Action::Crash));
+            let outcome = run(parts(wire, 1, true), &faults, 400);
+            assert!(outcome.held <= 2, "{phase}: {}", outcome.held);
+            assert_eq!(outcome.partner_lost, [PartnerLack::Stations, PartnerLack::Silent]);
+            assert_eq!(outcome.simulation.author(ROBOT), Some(TWIN), "{phase}");
+        }
     }
 }
 

@@ -239,7 +239,7 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::PointsChanged { moment, .. }
             | RemoteIo::PointsUnknown { moment, .. }
             | RemoteIo::PartChanged { moment, .. }
-            | RemoteIo::PartnerLost { moment }
+            | RemoteIo::PartnerLost { moment, .. }
             | RemoteIo::PartnerReceived { moment }
             | RemoteIo::SecondAuthor { moment }
             | RemoteIo::InputsDiffer { moment, .. }

@@ -70,6 +70,9 @@ pub(crate) fn asked_because(reason: AskReason) -> Option<&'static str> {
             "the newest state was kept by another program, or under other names or keys, and not all of it is taken over \
              (retained-dropped, retained-refused)",
         ),
+        AskReason::Unreceived => Some(
+            "a station that could compute it is not received, and may follow the other remote I/O, which is not received either",
+        ),
         AskReason::Configured => Some("restart = \"operator\" asks after each power failure"),
     }
 }

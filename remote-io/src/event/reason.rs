@@ -22,6 +22,8 @@ pub enum AskReason {
     Doubt,
     /// Values that were kept over a power failure are not in it, or it was kept under other names or keys.
     NotWhole,
+    /// A station that could have a newer one is not received, and may follow the other remote I/O, which is not received either.
+    Unreceived,
     /// It is as new as the newest applied output, and the operator chooses each start: `restart = "operator"`.
     Configured,
 }
@@ -30,6 +32,19 @@ impl AskReason {
     pub(super) fn is_doubt(&self) -> bool {
         *self == Self::Doubt
     }
+}
+
+/// Why the other one of two remote I/Os could not take over from the author.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PartnerLack {
+    /// The author does not receive it.
+    #[default]
+    Silent,
+    /// Its modules do not follow those of the author.
+    Modules,
+    /// It receives no station that has the program, and the author does.
+    Stations,
 }
 
 /// What retained operator inputs have after a start from a state of which there is no note.

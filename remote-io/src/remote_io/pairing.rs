@@ -36,7 +36,7 @@ use super::protection::Protection;
 use super::writing::Writing;
 use super::{Execution, RemoteIo};
 use crate::diagnosis::Diagnosing;
-use crate::event::Event;
+use crate::event::{Event, PartnerLack};
 use crate::settings::{PairSettings, Settings};
 use crate::trust::Trust;
 
@@ -87,7 +87,7 @@ pub(super) struct Pairing {
     received: Option<Sample>,
     /// Deadlines for which this one samples or begins to, and no station has followed it.
     idle: u32,
-    /// When the other one was received last, whether it was, and whether its loss was reported.
+    /// When the other one was received, whether it was, and whether its loss was reported.
     partner: Partner,
     /// The last report of the other one.
     theirs: Option<Pair>,
@@ -104,6 +104,10 @@ pub(super) struct Pairing {
 /// Whether the other remote I/O is received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Partner {
+    /// When it was received last, and why it could not have taken over then.
+    heard: Time,
+    lack: Option<PartnerLack>,
+    /// When it was received last as one that could take over.
     at: Time,
     is_known: bool,
     is_lost: bool,
@@ -174,7 +178,7 @@ impl Pairing {
             applied: None,
             received: None,
             idle: 0,
-            partner: Partner { at: now, is_known: false, is_lost: false },
+            partner: Partner { heard: now, lack: None, at: now, is_known: false, is_lost: false },
             theirs: None,
             refused: 0,
             asks: false,
@@ -211,6 +215,19 @@ impl Pairing {
                     theirs.able && (theirs.receives_stations || !self.receives_stations);
                 self.part == Part::Follower && goes_first && (can_begin || !self.able)
             }
+        }
+    }
+
+    /// Why the other one could not take over where this one fails, as it reports. That it receives no station says nothing where this one receives none too.
+    fn lack(&self, theirs: &Pair) -> Option<PartnerLack> {
+        if self.part != Part::Author {
+            None
+        } else if modules::are_away(theirs) {
+            Some(PartnerLack::Modules)
+        } else if self.receives_stations && !theirs.receives_stations {
+            Some(PartnerLack::Stations)
+        } else {
+            None
         }
     }
 

@@ -6,7 +6,7 @@ use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{
-    AskReason, Event as RemoteIoEvent, Lacking, LackingReason, OldInputs, ValueFault,
+    AskReason, Event as RemoteIoEvent, Lacking, LackingReason, OldInputs, PartnerLack, ValueFault,
 };
 use understudy_wire::{
     Configurations, Member, Moment, Part, ProgramSet, SignalPlace, StationId, StationSet, Word,
@@ -143,10 +143,11 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         "takes over from the other remote I/O of its program: it connects to the field";
     PartChanged { part: Part::Author, .. } => "part-changed" Notice
         "is the author of its program: it samples the inputs and drives the outputs";
-    PartnerLost { .. } => "partner-lost" Alarm
-        "does not receive the other remote I/O of its program in time: its own failure would not be masked";
+    PartnerLost { lack, .. } => "partner-lost" Alarm format!(
+        "{}: its own failure would not be masked", partner_lack_text(*lack)
+    );
     PartnerReceived { .. } => "partner-received" Notice
-        "receives the other remote I/O of its program again";
+        "the other remote I/O of its program can take over again";
     InputsDiffer { input, .. } => "inputs-differ" Alarm format!(
         "the modules of both remote I/Os differ at {}: the value on which they agreed last is sampled",
         members.place(SignalPlace::Input(*input))
@@ -344,6 +345,18 @@ fn configured_text(Configurations { own, prepared }: Configurations) -> String {
             format!("runs configuration {own}, and has loaded {prepared} for an online change")
         }
         None => format!("runs configuration {own}, and has loaded no other one"),
+    }
+}
+
+fn partner_lack_text(lack: PartnerLack) -> &'static str {
+    match lack {
+        PartnerLack::Silent => "does not receive the other remote I/O of its program in time",
+        PartnerLack::Modules => {
+            "the modules of the other remote I/O of its program do not follow its own"
+        }
+        PartnerLack::Stations => {
+            "the other remote I/O of its program receives no station that has the program"
+        }
     }
 }
 

@@ -5,8 +5,7 @@ use understudy_wire::{
 };
 
 use super::super::RemoteIo;
-use super::modules::is_of_use;
-use super::{AWAITED_ANSWERS, Partner};
+use super::AWAITED_ANSWERS;
 use crate::event::Event;
 
 impl RemoteIo {
@@ -55,8 +54,13 @@ impl RemoteIo {
             return;
         };
         let was_lost = pairing.partner.is_lost;
-        if pairing.part != Part::Author || is_of_use(theirs) {
-            pairing.partner = Partner { at: now, is_known: true, is_lost: false };
+        let lack = pairing.lack(theirs);
+        pairing.partner.heard = now;
+        pairing.partner.lack = lack;
+        if lack.is_none() {
+            pairing.partner.at = now;
+            pairing.partner.is_known = true;
+            pairing.partner.is_lost = false;
         }
         let is_back = was_lost && !pairing.partner.is_lost;
         pairing.theirs = Some(theirs.clone());

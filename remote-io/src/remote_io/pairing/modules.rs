@@ -209,7 +209,7 @@ impl RemoteIo {
     /// Whether the modules of the other one drive what they are sent, as far as it is known.
     fn is_followed_by_modules(&self) -> bool {
         let theirs = self.pairing.as_ref().and_then(|pairing| pairing.theirs.as_ref());
-        self.their_readings().is_some() && theirs.is_some_and(is_of_use)
+        self.their_readings().is_some() && theirs.is_some_and(|theirs| !are_away(theirs))
     }
 
     /// An author that ends to be one knows best which modules are not trusted, until it receives the next author.
@@ -318,7 +318,7 @@ impl RemoteIo {
     }
 }
 
-/// Whether the other one is of use to an author: its modules drive the same outputs.
-pub(super) fn is_of_use(theirs: &Pair) -> bool {
-    !matches!(theirs.modules, Some(Sent::Follower { follows: false, .. }))
+/// Whether the modules of the other one do not drive the outputs of the author.
+pub(super) fn are_away(theirs: &Pair) -> bool {
+    matches!(theirs.modules, Some(Sent::Follower { follows: false, .. }))
 }

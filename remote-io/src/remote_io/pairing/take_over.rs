@@ -47,7 +47,9 @@ impl RemoteIo {
         let loses = !pairing.partner.is_lost && now.since(pairing.partner.at) > patience;
         pairing.partner.is_lost |= loses;
         if loses {
-            self.report(Event::PartnerLost { moment });
+            let is_silent = now.since(pairing.partner.heard) > patience;
+            let lack = pairing.partner.lack.filter(|_| !is_silent).unwrap_or_default();
+            self.report(Event::PartnerLost { moment, lack });
         }
         self.hand_over(now, is_idle);
         self.begin_to_take_over(now);
@@ -138,7 +140,7 @@ impl RemoteIo {
         let newest = self.holders.newest().map(|(from, holding)| (from, holding.stepped));
         let (holder, newest) = newest.unzip();
         self.question = Some(Question::StateLost { told: newest, newest });
-        let (asks, reason) = (true, AskReason::Doubt);
+        let (asks, reason) = (true, AskReason::Unreceived);
         let inputs = None;
         self.report(Event::StateLost { moment, applied, newest, holder, asks, reason, inputs });
     }
