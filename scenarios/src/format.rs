@@ -91,6 +91,7 @@ pub(crate) static EXPECTATION: Table = Table {
         key("wrong", ANY),
         key("held", ANY),
         key("fail_safe", ANY),
+        key("missed", ANY),
         key("plant_faults", ANY),
         key("protected", Kind::Flag),
         key("functional", Kind::OneOrMany(&Kind::Text)),

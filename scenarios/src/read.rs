@@ -170,6 +170,7 @@ impl Reader<'_> {
         let wrong = count("wrong").unwrap_or(0);
         let held = count("held");
         let fail_safe = count("fail_safe");
+        let missed = count("missed");
         let plant_faults = count("plant_faults");
         let protected = fields.flag("protected", found);
         let functional = fields.texts("functional", found);
@@ -187,6 +188,7 @@ impl Reader<'_> {
             wrong,
             held,
             fail_safe,
+            missed,
             plant_faults,
             protected: protected.unwrap_or(false),
             functional: functional.iter().filter_map(|name| self.plant(name)).collect(),

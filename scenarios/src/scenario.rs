@@ -131,7 +131,7 @@ pub fn action_word(action: Action) -> &'static str {
 }
 
 /// An action with its numbers and names, as tables write it.
-pub(crate) fn action_text(member: Member, action: Action, members: &Members) -> String {
+pub fn action_text(member: Member, action: Action, members: &Members) -> String {
     let word = action_word(action);
     match action {
         Action::Write { input, value } => match written(member, (input, value), members) {
@@ -202,6 +202,8 @@ pub struct Expectation {
     pub held: Option<u64>,
     /// Cycles with fail-safe outputs, at most.
     pub fail_safe: Option<u64>,
+    /// Cycles in which no remote I/O of a program passed its deadline, at most.
+    pub missed: Option<u64>,
     /// Plant faults of all plants, at most.
     pub plant_faults: Option<u64>,
     /// Whether everybody must be synchronised at the end: each plant driven directly, and every station heard.

@@ -117,6 +117,7 @@ fn write_expectation(text: &mut String, expect: &Expectation, members: &Members)
     let counts = [
         ("held", expect.held),
         ("fail_safe", expect.fail_safe),
+        ("missed", expect.missed),
         ("plant_faults", expect.plant_faults),
     ];
     for (key, count) in counts {

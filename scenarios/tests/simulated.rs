@@ -123,6 +123,31 @@ during = [{ from = 40, to = 60, remote_io = "robot-io", source = "direct" }]
     ");
 }
 
+/// The cycles in which a remote I/O is killed are neither held nor fail-safe: they are missed, and have a limit of their own.
+#[test]
+fn missed_cycles_have_a_limit() {
+    let text = r#"
+title = "A remote I/O is killed"
+cycles = 100
+step = [
+    { at = 50, action = "crash", station = "robot-io" },
+    { at = 60, action = "restart", station = "robot-io" },
+]
+[expect]
+missed = 0
+"#;
+    let (_, summary, _) = run(Mode::Full, text, 1);
+    assert!(!summary.passed);
+    let unmet: Vec<_> = summary.expectations.iter().filter(|expected| !expected.met).collect();
+    let [missed] = unmet[..] else { panic!("{:?}", summary.expectations) };
+    assert_eq!(missed.expected, "no cycles missed");
+    let found = summary.total().missed;
+    assert!(found >= 10, "{found}");
+    assert_eq!(missed.found, found.to_string());
+    let allowed = text.replace("missed = 0", &format!("missed = {found}"));
+    assert!(run(Mode::Full, &allowed, 1).1.passed);
+}
+
 /// The journal alone holds all that the account was made of.
 #[test]
 fn the_account_can_be_made_again_from_the_journal() {

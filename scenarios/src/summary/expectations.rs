@@ -56,6 +56,9 @@ pub(super) fn expectations(
         let by_stall = total.fail_safe_by_stall;
         list.push(at_most("cycles fail-safe", fail_safe, total.fail_safe, by_stall));
     }
+    if let Some(missed) = expect.missed {
+        list.push(at_most("cycles missed", missed, total.missed, 0));
+    }
     if let Some(allowed) = expect.plant_faults {
         list.push(at_most("plant_faults", allowed, plant_faults, 0));
     }
