@@ -20,7 +20,7 @@ pub use figure::{FigureError, Signals, figure};
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
 pub use report::{ReportError, report};
 pub use results::{ResultsError, write_results};
-pub use scenario::{ACTIONS, During, Expectation, Scenario, TABLE_TWO, action_word};
+pub use scenario::{ACTIONS, During, Expectation, Scenario, TABLE_TWO, action_text, action_word};
 pub use schema::scenario_schema;
 pub use simulation::{NotInStep, simulate};
 pub use summary::{

@@ -297,7 +297,7 @@ fn a_direct_link_is_pulled_where_there_is_one() {
         ("io", "", "U0303"),
         ("io", "network = 1", "U0309"),
         ("io", "network = 3", "U0305"),
-        ("io", "network = 1\ndirect_link = true", "U0302"),
+        ("io", "network = 1\ndirect_link = true", "U0309"),
     ] {
         let report = found(&step(1, "unplug", station, more)).report;
         let codes: Vec<&str> = report.diagnostics.iter().map(|it| it.code).collect();

@@ -107,6 +107,11 @@ fn twins_that_cannot_work_are_refused_in_words_of_the_cluster_file() {
     check(linked("networks = 2\n", first, &on_second), "U0263", &words);
     check(linked("", "direct_link = true", &twin), "U0202", &["direct_link"]);
 
+    let one_host = linked("", "link_address = \"10.0.9.22:7452\"", &twin);
+    let (status, codes, messages, _) = found(&one_host);
+    assert_eq!((status, codes.concat().as_str()), (0, "U0262"), "{messages}");
+    assert!(messages.contains("both at 10.0.9.22"), "{messages}");
+
     // A twin has the program of its remote I/O, and serves no other one.
     check(pump("", &exclusive("controller = \"right\""), ""), "U0202", &["controller"]);
     let of_the_other = "name = \"right-io\"\nwiring = \"exclusive\"";

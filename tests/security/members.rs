@@ -2,10 +2,13 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
 use std::os::unix::net::UnixDatagram;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Instant;
+
+use understudy_bus::free_addresses;
 
 use super::{
     DEADLINE, Running, addressed_cell, answer, codes, empty_folder, some_at_a_time, text,
@@ -260,4 +263,53 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
     let here = ["doctor", cluster, "--name", "press", "--link", "udp", "--keys", &press];
     let (_, document, _) = answer(&here);
     assert_eq!(doctor(&document, "ports", "warning").len(), 2, "it runs here: {document:#}");
+}
+
+/// A direct link on which nothing arrives is named as such, where the other remote I/O is heard over the network.
+#[test]
+fn doctor_names_a_direct_link_over_which_nothing_is_heard() {
+    let _one = some_at_a_time();
+    let folder = empty_folder("doctor-link");
+    let cluster = addressed_cell(&folder);
+    let [twin, link, twin_link, elsewhere] =
+        free_addresses(4).expect("four free ports").try_into().expect("as many as were asked for");
+    let of = |twin_link: SocketAddr| {
+        format!(
+            "name = \"robot-io\"\nlink_address = \"{link}\"\ntwin = {{ name = \"robot-io-2\", wiring = \"exclusive\", \
+             address = \"{twin}\", direct_link = true, link_address = \"{twin_link}\" }}"
+        )
+    };
+    let text_of = fs::read_to_string(&cluster).expect("it was written");
+    let with = |twin_link| text_of.replacen("name = \"robot-io\"", &of(twin_link), 1);
+    fs::write(&cluster, with(twin_link)).expect("it is ours");
+    let wrong = folder.join("wrong.toml");
+    fs::write(&wrong, with(elsewhere)).expect("it is ours");
+
+    let keys = folder.join("keys");
+    assert_eq!(answer(&["keys", "init", text(&cluster), "--folder", text(&keys)]).0, 0);
+    let own = |name: &str| keys.join("members").join(name);
+    let (first, second) = (own("robot-io"), own("robot-io-2"));
+    let common = ["--link", "udp", "--keys"];
+    let doctor_says = |wanted: &str, check: &str, health: &str| {
+        let started = Instant::now();
+        loop {
+            let start = ["doctor", text(&cluster), "--name", "robot-io-2", "--listen", "20"];
+            let (_, document, _) = answer(&[&start[..], &common, &[text(&second)]].concat());
+            let found = doctor(&document, check, health);
+            if found.iter().any(|found| found.contains(wanted)) {
+                return;
+            }
+            assert!(started.elapsed() < DEADLINE, "{document:#}");
+        }
+    };
+    let started_with = |cluster: &Path| {
+        let start = ["remote-io", text(cluster), "--name", "robot-io", "--no-real-time"];
+        Running::start(&[&start[..], &common, &[text(&first)]].concat())
+    };
+    let running = started_with(&wrong);
+    let words = "is heard over network 1 and not over the direct link";
+    doctor_says(words, "networks", "bad");
+    drop(running);
+    let _running = started_with(&cluster);
+    doctor_says(") is heard", "peer", "good");
 }

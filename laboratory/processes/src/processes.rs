@@ -8,7 +8,7 @@ use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
 use understudy_bus::{Cuts, HostEvent, log_environment, zenoh_runtime};
 use understudy_journal::{Happening, Record, RunEvent, check_version};
-use understudy_scenarios::action_word;
+use understudy_scenarios::{action_text, action_word};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Member, SignalPlace, Via};
 
@@ -77,6 +77,10 @@ impl Laboratory<'_> {
             let after = self.recovery.ended(member, Instant::now());
             self.show_step(format!("{error}; again in {after:?}"));
         }
+    }
+
+    fn action_text(&self, step: &Fault) -> String {
+        action_text(step.member, step.action, &self.account.terms.members)
     }
 
     /// A line for whoever watches the run.
@@ -175,7 +179,8 @@ impl Laboratory<'_> {
         };
         if let Some(why) = cannot {
             // Only after a member ended unexpectedly, or an operator acted: scenarios are checked for it.
-            self.show_step(format!("no {} of {name}: {why}", action_word(step.action)));
+            let action = self.action_text(step);
+            self.show_step(format!("{name}: no {action}: {why}"));
             return Ok(());
         }
         let done = match (step.action, self.processes.get_mut(&step.member)) {
@@ -222,10 +227,8 @@ impl Laboratory<'_> {
             member: step.member,
             asked: step.at_cycle,
         });
-        (self.watch)(Progress::Step {
-            cycle: step.at_cycle,
-            what: format!("{} {name}", action_word(step.action)),
-        });
+        let what = format!("{name}: {}", self.action_text(step));
+        (self.watch)(Progress::Step { cycle: step.at_cycle, what });
         Ok(())
     }
 

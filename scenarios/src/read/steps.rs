@@ -354,6 +354,12 @@ impl Reader<'_> {
         let is_link = fields.flag("direct_link", &mut self.diagnostics).unwrap_or(false);
         if !is_link {
             fields.require(&["network"], &mut self.diagnostics);
+        } else if fields.has("network") {
+            let message = "a cable is that of a network or the direct link, not both";
+            let help = "write one step for each, or remove `network`";
+            let found = Diagnostic::error("U0309", message, fields.span());
+            self.diagnostics.push(found.with_help(help));
+            fields.ignore(&["network"]);
         }
         let others = fields.flag("others", &mut self.diagnostics).unwrap_or(false);
         let place = fields.span();

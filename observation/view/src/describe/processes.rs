@@ -224,8 +224,8 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
         Action::Continue => format!("{name} is resumed"),
         Action::Cut { to } => format!("{name} is cut off from {}", members.name(to)),
         Action::Heal { to } => format!("{name} is connected to {} again", members.name(to)),
-        Action::Unplug { network } => format!("{name} is unplugged from network {network}"),
-        Action::Plug { network } => format!("{name} is plugged into network {network} again"),
+        Action::Unplug { network } => format!("{name} is unplugged from {network}"),
+        Action::Plug { network } => format!("{name} is plugged into {network} again"),
         Action::Delay { to, by } => format!("{} receives {name} {by:?} later", members.name(to)),
         Action::Release => format!("{name} is released"),
         Action::Write { input, value } => {

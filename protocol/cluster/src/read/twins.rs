@@ -113,8 +113,8 @@ pub(super) fn check_link(
 
 /// Warns of two remote I/Os of a program on one machine.
 fn check_host(section: &TwinSection, first: &RemoteIo, diagnostics: &mut Vec<Diagnostic>) {
-    let own = section.addresses.as_ref();
-    let pairs = [(own.first, first.addresses.first), (own.second, first.addresses.second)];
+    let (own, first) = (section.addresses.as_ref(), first.addresses);
+    let pairs = [(own.first, first.first), (own.second, first.second), (own.link, first.link)];
     for (own, first) in pairs {
         let (Some(own), Some(first)) = (own, first) else {
             continue;
