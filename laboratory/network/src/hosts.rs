@@ -68,6 +68,14 @@ pub struct Hosts {
     /// Whether there is a second network.
     has_two_networks: bool,
     nft: PathBuf,
+    /// What is to fail, and what does since the last [`Self::apply`].
+    failures: Failures,
+    applied: Option<Failures>,
+}
+
+/// What does not pass between hosts.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Failures {
     /// From where to where nothing passes.
     cuts: BTreeSet<(usize, usize)>,
     /// Of what passes from one host to another, by chance.
@@ -111,14 +119,13 @@ impl Hosts {
         let hosts = names.iter().enumerate().map(|(place, name)| {
             Ok(Host { name: name.clone(), place: place as u8, namespace: new_namespace(&own)? })
         });
-        let hosts = Self {
+        let mut hosts = Self {
             hosts: hosts.collect::<Result<_, NetworkError>>()?,
             own,
             switch,
             nft,
-            cuts: BTreeSet::new(),
-            losses: BTreeMap::new(),
-            unplugged: BTreeSet::new(),
+            failures: Failures::default(),
+            applied: None,
             has_two_networks,
         };
         let is_on = |place: usize, via: Via| match via {
@@ -160,7 +167,7 @@ impl Hosts {
             }
             hosts.within(place, || run(&ip, &["-batch", "-"], &lines))??;
         }
-        hosts.apply_rules()?;
+        hosts.apply()?;
         Ok(hosts)
     }
 
@@ -188,98 +195,84 @@ impl Hosts {
         visit(&self.switch, &self.own, work)
     }
 
-    /// Lets nothing more through the networks from one host to another, or everything again.
+    /// Lets nothing more through the networks from one host to another, or everything again, when it is applied.
+    pub fn cut(&mut self, pair: (usize, usize), cut: bool) {
+        set(&mut self.failures.cuts, pair, cut);
+    }
+
+    /// Pulls the cable between a host and one network, or its direct link, or plugs it in again, when it is applied.
+    pub fn unplug(&mut self, host: usize, via: Via, is_unplugged: bool) {
+        set(&mut self.failures.unplugged, (via, host), is_unplugged);
+    }
+
+    /// Loses a share of what passes through the networks from one host to another, by chance, when it is applied.
+    pub fn lose(&mut self, pairs: &[(usize, usize)], share: Share) {
+        self.failures.losses.extend(pairs.iter().map(|pair| (*pair, share)));
+        self.failures.losses.retain(|_, share| !share.is_never());
+    }
+
+    /// Applies all of that at one time, since `nft` takes a file as a whole or not at all.
     ///
     /// # Errors
     /// What `nft` said; everything passes as before then.
-    pub fn cut(&mut self, pairs: &[(usize, usize)], cut: bool) -> Result<(), NetworkError> {
-        let before = self.cuts.clone();
-        for pair in pairs {
-            if cut {
-                self.cuts.insert(*pair);
-            } else {
-                self.cuts.remove(pair);
-            }
+    pub fn apply(&mut self) -> Result<(), NetworkError> {
+        if self.applied.as_ref() == Some(&self.failures) {
+            return Ok(());
         }
-        self.apply_rules().inspect_err(|_| self.cuts = before)
-    }
-
-    /// Pulls the cable between a host and one network, or its direct link, or plugs it in again.
-    ///
-    /// # Errors
-    /// What `nft` said; everything passes as before then.
-    pub fn unplug(
-        &mut self,
-        host: usize,
-        via: Via,
-        is_unplugged: bool,
-    ) -> Result<(), NetworkError> {
-        let before = self.unplugged.clone();
-        match is_unplugged {
-            true => self.unplugged.insert((via, host)),
-            false => self.unplugged.remove(&(via, host)),
-        };
-        self.apply_rules().inspect_err(|_| self.unplugged = before)
-    }
-
-    /// Loses a share of what passes through the networks from one host to another, by chance.
-    ///
-    /// # Errors
-    /// What `nft` said; everything passes as before then.
-    pub fn lose(&mut self, pairs: &[(usize, usize)], share: Share) -> Result<(), NetworkError> {
-        let before = self.losses.clone();
-        for pair in pairs {
-            self.losses.insert(*pair, share);
-        }
-        self.losses.retain(|_, share| !share.is_never());
-        self.apply_rules().inspect_err(|_| self.losses = before)
-    }
-
-    /// All rules at once: `nft` takes a file as a whole or not at all.
-    fn apply_rules(&self) -> Result<(), NetworkError> {
         let networks = if self.has_two_networks { &Via::NETWORKS[..] } else { &[Via::First] };
-        let mut rules = rules(networks, &self.cuts, &self.losses);
+        let rules = self.failures.rules(networks);
+        let done = self.in_switch(|| run(&self.nft, &["-f", "-"], &rules)).flatten();
+        match done {
+            Ok(()) => self.applied = Some(self.failures.clone()),
+            Err(_) => self.failures = self.applied.clone().unwrap_or_default(),
+        }
+        done
+    }
+}
+
+fn set<T: Ord>(all: &mut BTreeSet<T>, one: T, is_in: bool) {
+    if is_in {
+        all.insert(one);
+    } else {
+        all.remove(&one);
+    }
+}
+
+impl Failures {
+    /// What `nft` reads. Only packets of IP are touched, so that hosts still find each other.
+    fn rules(&self, networks: &[Via]) -> String {
+        let mut text = String::from(
+            "add table bridge links\n\
+             add chain bridge links pass { type filter hook forward priority 0; policy accept; }\n\
+             flush chain bridge links pass\n",
+        );
+        let mut rule = |(from, to): &(usize, usize), what: &str| {
+            for via in networks {
+                let port = PORTS[via.index()];
+                let _ = writeln!(
+                    text,
+                    "add rule bridge links pass iifname \"{port}{from}\" oifname \"{port}{to}\" ether type ip {what}"
+                );
+            }
+        };
+        for pair in &self.cuts {
+            rule(pair, "drop");
+        }
+        for (pair, share) in &self.losses {
+            let parts = (share.get() * PARTS as f64).round() as u64;
+            rule(pair, &format!("numgen random mod {PARTS} < {parts} drop"));
+        }
         for (via, host) in &self.unplugged {
             let port = PORTS[via.index()];
             for side in ["iifname", "oifname"] {
                 let _ = writeln!(
-                    rules,
+                    text,
                     "add rule bridge links pass {side} \"{port}{host}\" ether type ip drop"
                 );
             }
         }
-        self.in_switch(|| run(&self.nft, &["-f", "-"], &rules))?
+        text
     }
-}
-
-/// What `nft` reads. Only packets of IP are touched, so that hosts still find each other.
-fn rules(
-    networks: &[Via],
-    cuts: &BTreeSet<(usize, usize)>,
-    losses: &BTreeMap<(usize, usize), Share>,
-) -> String {
-    let mut text = String::from(
-        "add table bridge links\n\
-         add chain bridge links pass { type filter hook forward priority 0; policy accept; }\n\
-         flush chain bridge links pass\n",
-    );
-    let mut rule = |(from, to): &(usize, usize), what: &str| {
-        for via in networks {
-            let port = PORTS[via.index()];
-            let _ = writeln!(
-                text,
-                "add rule bridge links pass iifname \"{port}{from}\" oifname \"{port}{to}\" ether type ip {what}"
-            );
-        }
-    };
-    for pair in cuts {
-        rule(pair, "drop");
-    }
-    for (pair, share) in losses {
-        let parts = (share.get() * PARTS as f64).round() as u64;
-        rule(pair, &format!("numgen random mod {PARTS} < {parts} drop"));
-    }
-    text
 }
 
 fn current_namespace() -> Result<OwnedFd, NetworkError> {
@@ -318,14 +311,20 @@ mod tests {
     #[test]
     fn rules_name_pairs_and_shares() {
         let share = Share::new(0.1).expect("a share");
-        let (cuts, losses) = (BTreeSet::from([(0, 1)]), BTreeMap::from([((2, 0), share)]));
-        let text = rules(&[Via::First], &cuts, &losses);
+        let failures = Failures {
+            cuts: BTreeSet::from([(0, 1)]),
+            losses: BTreeMap::from([((2, 0), share)]),
+            unplugged: BTreeSet::from([(Via::Second, 3)]),
+        };
+        let text = failures.rules(&[Via::First]);
         let rules: Vec<&str> = text.lines().skip(3).collect();
         assert_eq!(
             rules,
             [
                 "add rule bridge links pass iifname \"h0\" oifname \"h1\" ether type ip drop",
                 "add rule bridge links pass iifname \"h2\" oifname \"h0\" ether type ip numgen random mod 1000000 < 100000 drop",
+                "add rule bridge links pass iifname \"s3\" ether type ip drop",
+                "add rule bridge links pass oifname \"s3\" ether type ip drop",
             ]
         );
     }

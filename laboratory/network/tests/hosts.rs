@@ -58,11 +58,13 @@ fn links_are_cut_and_healed_one_way_at_a_time() {
             }
         }
     }
-    hosts.cut(&[(0, 1)], true).expect("cut");
+    hosts.cut((0, 1), true);
+    hosts.apply().expect("cut");
     assert_eq!(arrive(&sockets, 0, 1, 3), 0);
     assert_eq!(arrive(&sockets, 1, 0, 3), 3);
     assert_eq!(arrive(&sockets, 0, 2, 3), 3);
-    hosts.cut(&[(0, 1)], false).expect("healed");
+    hosts.cut((0, 1), false);
+    hosts.apply().expect("healed");
     assert_eq!(arrive(&sockets, 0, 1, 3), 3);
 }
 
@@ -74,11 +76,13 @@ fn a_share_is_lost_by_chance() {
     let sockets = sockets(&hosts);
     assert_eq!(arrive(&sockets, 0, 1, 100), 100);
     let half = Share::new(0.5).expect("a share");
-    hosts.lose(&[(0, 1)], half).expect("lost");
+    hosts.lose(&[(0, 1)], half);
+    hosts.apply().expect("lost");
     let found = arrive(&sockets, 0, 1, 100);
     assert!((20..80).contains(&found), "{found} of 100");
     let none = Share::default();
-    hosts.lose(&[(0, 1)], none).expect("whole again");
+    hosts.lose(&[(0, 1)], none);
+    hosts.apply().expect("whole again");
     assert_eq!(arrive(&sockets, 0, 1, 100), 100);
 }
 

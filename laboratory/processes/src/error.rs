@@ -2,11 +2,25 @@
 
 use std::io;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use understudy_bus::BusError;
 use understudy_journal::JOURNAL_VERSION;
 use understudy_keys::KeysError;
 use understudy_network::NetworkError;
+
+/// Older than this, the newest record that was read says that the laboratory itself is late.
+const LATE: Duration = Duration::from_secs(2);
+
+fn behind_text(behind: Duration) -> String {
+    match behind > LATE {
+        true => format!(
+            "; the laboratory reads records that are {} s old: this machine is too slow or too busy for the run",
+            behind.as_secs()
+        ),
+        false => String::new(),
+    }
+}
 
 /// Everything that was started is stopped when one of these comes out. The codes are stable.
 #[derive(Debug, thiserror::Error)]
@@ -51,12 +65,14 @@ pub enum LaboratoryError {
         names: Vec<String>,
     },
     /// The cycles of the cluster ceased.
-    #[error("U0525: no cycle for {seconds} s, after cycle {cycle}")]
+    #[error("U0525: no cycle for {seconds} s, after cycle {cycle}{}", behind_text(*.behind))]
     NoCycles {
         /// How long it was waited for.
         seconds: u64,
         /// The last cycle that was decided.
         cycle: u64,
+        /// How old the newest record is that the laboratory has read.
+        behind: Duration,
     },
     /// A step of the scenario could not be done.
     #[error("U0526: {action} {name}: {source}")]

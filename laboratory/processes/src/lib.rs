@@ -29,7 +29,7 @@ use understudy_journal::{
     Commands, Journal, JournalState, KEYS, PendingOrders, RETAINED, Record, RunDirectory, RunEvent,
     RunSocket, commands as queue_of_commands, keep_cluster, monotonic_ns,
 };
-use understudy_simulator::Action;
+use understudy_simulator::{Action, Fault};
 use understudy_wire::{ConfigurationHash, Member};
 
 use understudy_scenarios::{Account, OriginRule, Scenario, Terms};
@@ -213,6 +213,7 @@ fn run(
         journal: Some(journal),
         processes: BTreeMap::new(),
         lives: BTreeMap::new(),
+        newest_ns: 0,
         ready: BTreeSet::new(),
         machine: BTreeSet::new(),
         cuts: BTreeMap::new(),
@@ -277,6 +278,8 @@ struct Laboratory<'w> {
     journal: Option<Journal>,
     processes: BTreeMap<Member, Process>,
     lives: BTreeMap<Member, u32>,
+    /// Time of the newest record that was read, as [`monotonic_ns`] counts.
+    newest_ns: u64,
     /// Members that have said that they listen.
     ready: BTreeSet<Member>,
     machine: BTreeSet<String>,
@@ -355,9 +358,9 @@ impl Laboratory<'_> {
             }
             let now = Instant::now();
             self.conductor.follow(self.account.cycle(), now);
-            while let Some(step) = self.conductor.take_due(now) {
-                self.do_step(&step).await?;
-            }
+            let due = std::iter::from_fn(|| self.conductor.take_due(now));
+            let due: Vec<Fault> = due.collect();
+            self.do_steps(&due).await?;
             while let Some(member) = self.recovery.take_due(now) {
                 self.restart(member).await;
             }
@@ -391,6 +394,7 @@ impl Laboratory<'_> {
     }
 
     fn take(&mut self, record: &Record) {
+        self.newest_ns = self.newest_ns.max(record.at_ns);
         let had_origin = self.account.origin().is_some();
         if let Some(journal) = &mut self.journal {
             journal.write(record);

@@ -138,7 +138,7 @@ impl Laboratory<'_> {
             member,
             action,
         };
-        let done = self.do_step(&step).await;
+        let done = self.do_steps(&[step]).await;
         let done = done.map(|()| Done::default());
         done.map_err(|error| self.system(member, error))
     }

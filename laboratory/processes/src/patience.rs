@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use understudy_journal::monotonic_ns;
+
 use super::{Laboratory, LaboratoryError, Progress};
 use crate::process::Process;
 
@@ -68,7 +70,9 @@ impl Laboratory<'_> {
             waits.cycle = Some(cycle);
             waits.cycle_since = now;
         } else if over(waits.cycle_since, CYCLE_PATIENCE) {
-            return Err(LaboratoryError::NoCycles { seconds: CYCLE_PATIENCE.as_secs(), cycle });
+            let behind = Duration::from_nanos(monotonic_ns().saturating_sub(self.newest_ns));
+            let seconds = CYCLE_PATIENCE.as_secs();
+            return Err(LaboratoryError::NoCycles { seconds, cycle, behind });
         }
         Ok(())
     }

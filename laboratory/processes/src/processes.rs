@@ -73,7 +73,7 @@ impl Laboratory<'_> {
             member,
             action: Action::Restart,
         };
-        if let Err(error) = self.do_step(&step).await {
+        if let Err(error) = self.do_steps(&[step]).await {
             let after = self.recovery.ended(member, Instant::now());
             self.show_step(format!("{error}; again in {after:?}"));
         }
@@ -158,7 +158,36 @@ impl Laboratory<'_> {
         Ok(())
     }
 
-    pub(super) async fn do_step(&mut self, step: &Fault) -> Result<(), LaboratoryError> {
+    /// Does steps that are due at one time. What they cut between hosts is cut at one time, as where a network fails.
+    pub(super) async fn do_steps(&mut self, steps: &[Fault]) -> Result<(), LaboratoryError> {
+        let mut done = Vec::new();
+        for step in steps {
+            if self.begin_step(step).await? {
+                done.push(step);
+            }
+        }
+        if let Some(last) = steps.last() {
+            self.site.apply().map_err(|source| self.step_failed(last, source))?;
+        }
+        for step in done {
+            self.note(RunEvent::Fault {
+                action: step.action,
+                member: step.member,
+                asked: step.at_cycle,
+            });
+            let what = format!("{}: {}", self.name(step.member), self.action_text(step));
+            (self.watch)(Progress::Step { cycle: step.at_cycle, what });
+        }
+        Ok(())
+    }
+
+    fn step_failed(&self, step: &Fault, source: std::io::Error) -> LaboratoryError {
+        let name = self.name(step.member);
+        LaboratoryError::Step { action: action_word(step.action), name, source }
+    }
+
+    /// False where the step cannot be done as its member is.
+    async fn begin_step(&mut self, step: &Fault) -> Result<bool, LaboratoryError> {
         let name = self.name(step.member);
         let running = self.is_running(step.member);
         let cannot = match step.action {
@@ -181,7 +210,7 @@ impl Laboratory<'_> {
             // Only after a member ended unexpectedly, or an operator acted: scenarios are checked for it.
             let action = self.action_text(step);
             self.show_step(format!("{name}: no {action}: {why}"));
-            return Ok(());
+            return Ok(false);
         }
         let done = match (step.action, self.processes.get_mut(&step.member)) {
             (Action::Restart, _) => {
@@ -217,24 +246,12 @@ impl Laboratory<'_> {
             // Refused before the run began.
             _ => Err(std::io::ErrorKind::Unsupported.into()),
         };
-        done.map_err(|source| LaboratoryError::Step {
-            action: action_word(step.action),
-            name: name.clone(),
-            source,
-        })?;
-        self.note(RunEvent::Fault {
-            action: step.action,
-            member: step.member,
-            asked: step.at_cycle,
-        });
-        let what = format!("{name}: {}", self.action_text(step));
-        (self.watch)(Progress::Step { cycle: step.at_cycle, what });
-        Ok(())
+        done.map(|()| true).map_err(|source| self.step_failed(step, source))
     }
 
     /// No frame of one member counts for another any more, or each does again.
     async fn cut(&mut self, from: Member, to: Member, is_cut: bool) -> std::io::Result<()> {
-        if self.site.cut(from, to, is_cut)? {
+        if self.site.cut(from, to, is_cut) {
             return Ok(());
         }
         let cuts = self.cuts.entry(to).or_default();
@@ -252,7 +269,7 @@ impl Laboratory<'_> {
         network: Via,
         is_unplugged: bool,
     ) -> std::io::Result<()> {
-        if self.site.unplug(member, network, is_unplugged)? {
+        if self.site.unplug(member, network, is_unplugged) {
             return Ok(());
         }
         let cuts = self.cuts.entry(member).or_default();

@@ -136,7 +136,8 @@ impl Site {
         match &mut hosts {
             Some(hosts) if only_loss && impaired.is_none() => {
                 let pairs = site.pairs_of_hosts();
-                hosts.lose(&pairs, impairment.loss)?;
+                hosts.lose(&pairs, impairment.loss);
+                hosts.apply()?;
             }
             None if impairment.is_none() => {
                 let wanted = link == LinkKind::Udp;
@@ -176,14 +177,14 @@ impl Site {
 
     /// Lets no frame of one member through the networks to another any more, or each again. False where nothing between them can do that, so that the
     /// receiver has to drop them.
-    pub(super) fn cut(&mut self, from: Member, to: Member, cut: bool) -> io::Result<bool> {
+    pub(super) fn cut(&mut self, from: Member, to: Member, cut: bool) -> bool {
         let places = (self.host_of.get(&from), self.host_of.get(&to));
         match (&mut self.hosts, &self.proxy, places) {
             (Some(hosts), None, (Some(&from), Some(&to))) if from != to => {
-                let done = hosts.cut(&[(from, to)], cut);
-                done.map(|()| true).map_err(io::Error::other)
+                hosts.cut((from, to), cut);
+                true
             }
-            _ => Ok(false),
+            _ => false,
         }
     }
 
@@ -193,18 +194,21 @@ impl Site {
     }
 
     /// Pulls the cable between a member's host and a network, or its direct link, or plugs it in again. False where the member has to do it by itself.
-    pub(super) fn unplug(
-        &mut self,
-        member: Member,
-        via: Via,
-        is_unplugged: bool,
-    ) -> io::Result<bool> {
+    pub(super) fn unplug(&mut self, member: Member, via: Via, is_unplugged: bool) -> bool {
         match (&mut self.hosts, &self.proxy, self.host_of.get(&member)) {
             (Some(hosts), None, Some(&host)) => {
-                let done = hosts.unplug(host, via, is_unplugged);
-                done.map(|()| true).map_err(io::Error::other)
+                hosts.unplug(host, via, is_unplugged);
+                true
             }
-            _ => Ok(false),
+            _ => false,
+        }
+    }
+
+    /// Applies what was cut and unplugged between hosts, at one time.
+    pub(super) fn apply(&mut self) -> io::Result<()> {
+        match &mut self.hosts {
+            Some(hosts) => hosts.apply().map_err(io::Error::other),
+            None => Ok(()),
         }
     }
 

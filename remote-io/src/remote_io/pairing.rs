@@ -104,9 +104,6 @@ pub(super) struct Pairing {
 /// Whether the other remote I/O is received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Partner {
-    /// When it was received last, and why it could not have taken over then.
-    heard: Time,
-    lack: Option<PartnerLack>,
     /// When it was received last as one that could take over.
     at: Time,
     is_known: bool,
@@ -178,7 +175,7 @@ impl Pairing {
             applied: None,
             received: None,
             idle: 0,
-            partner: Partner { heard: now, lack: None, at: now, is_known: false, is_lost: false },
+            partner: Partner { at: now, is_known: false, is_lost: false },
             theirs: None,
             refused: 0,
             asks: false,

@@ -5,7 +5,7 @@ use understudy_wire::{
 };
 
 use super::super::RemoteIo;
-use super::AWAITED_ANSWERS;
+use super::{AWAITED_ANSWERS, Partner};
 use crate::event::Event;
 
 impl RemoteIo {
@@ -54,13 +54,8 @@ impl RemoteIo {
             return;
         };
         let was_lost = pairing.partner.is_lost;
-        let lack = pairing.lack(theirs);
-        pairing.partner.heard = now;
-        pairing.partner.lack = lack;
-        if lack.is_none() {
-            pairing.partner.at = now;
-            pairing.partner.is_known = true;
-            pairing.partner.is_lost = false;
+        if pairing.lack(theirs).is_none() {
+            pairing.partner = Partner { at: now, is_known: true, is_lost: false };
         }
         let is_back = was_lost && !pairing.partner.is_lost;
         pairing.theirs = Some(theirs.clone());

@@ -47,8 +47,8 @@ impl RemoteIo {
         let loses = !pairing.partner.is_lost && now.since(pairing.partner.at) > patience;
         pairing.partner.is_lost |= loses;
         if loses {
-            let is_silent = now.since(pairing.partner.heard) > patience;
-            let lack = pairing.partner.lack.filter(|_| !is_silent).unwrap_or_default();
+            let theirs = pairing.theirs.as_ref();
+            let lack = theirs.and_then(|theirs| pairing.lack(theirs)).unwrap_or_default();
             self.report(Event::PartnerLost { moment, lack });
         }
         self.hand_over(now, is_idle);
