@@ -3,6 +3,7 @@
 
 use std::fmt::Write;
 
+use understudy_executable::Interface;
 use understudy_logic::{Circuit, Expression, Operation, Variable};
 use understudy_typed::Program as TypedProgram;
 
@@ -39,6 +40,26 @@ pub(crate) fn circuit_text(circuit: &Circuit, retentive: &[u64]) -> String {
         }
     }
     walk.text
+}
+
+/// The points of a program, line by line: names, places, types with their subranges, and the names of values.
+pub(crate) fn points_text(Interface { inputs, outputs }: &Interface) -> String {
+    let mut text = String::new();
+    let sides = [("input", inputs), ("output", outputs)];
+    let points =
+        sides.into_iter().flat_map(|(side, points)| points.iter().map(move |it| (side, it)));
+    for (side, point) in points {
+        // Writing to a text cannot fail.
+        let _ = write!(text, "{side} {} at {} {}", point.name, point.bit, point.of);
+        if let Some((low, high)) = point.range {
+            let _ = write!(text, " {low}..{high}");
+        }
+        for (name, value) in point.values.iter().flat_map(|known| &known.values) {
+            let _ = write!(text, " {name}={value}");
+        }
+        text.push('\n');
+    }
+    text
 }
 
 /// A typed program: its layout, its routines with the lines that a fault names, and its initial state. The names and types of its variables are in it,

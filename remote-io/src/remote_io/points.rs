@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use understudy_cycle::{Layout, OnlineChange, Output, Passage};
-use understudy_wire::{Header, Holding, Image, ProgramHash, Recalled};
+use understudy_wire::{Header, Holding, Image, PointsHash, ProgramHash, Recalled};
 
 use super::{Execution, RemoteIo};
 use crate::event::Event;
@@ -105,6 +105,12 @@ impl RemoteIo {
             recalled.pulses.sort_unstable_by_key(|pulse| pulse.input);
         }
         recalled
+    }
+
+    /// Whether a signal that was found by these points is the one that has its place now. Who says nothing of points means those that count, as long as no
+    /// loaded change can replace them.
+    pub(super) fn counts_by(&self, points: Option<PointsHash>) -> bool {
+        points.map_or(!self.replaces_points(), |points| points == self.layout.hash)
     }
 
     /// The sensors show these values, by the points that the device is read by.
