@@ -6,6 +6,7 @@ use std::fmt::Write;
 use understudy_executable::Interface;
 use understudy_logic::{Circuit, Expression, Operation, Variable};
 use understudy_typed::Program as TypedProgram;
+use understudy_wire::PointsHash;
 
 /// A circuit, line by line: its inputs, registers with initial values, outputs, and the operations that they reach; and the registers that a warm
 /// start keeps, `retentive`, where there are any.
@@ -42,8 +43,8 @@ pub(crate) fn circuit_text(circuit: &Circuit, retentive: &[u64]) -> String {
     walk.text
 }
 
-/// The points of a program, line by line: names, places, types with their subranges, and the names of values.
-pub(crate) fn points_text(Interface { inputs, outputs }: &Interface) -> String {
+/// Identifies the points of a program: by names, places, types with their subranges, and the names of values.
+pub(crate) fn points_hash(Interface { inputs, outputs }: &Interface) -> PointsHash {
     let mut text = String::new();
     let sides = [("input", inputs), ("output", outputs)];
     let points =
@@ -59,7 +60,7 @@ pub(crate) fn points_text(Interface { inputs, outputs }: &Interface) -> String {
         }
         text.push('\n');
     }
-    text
+    PointsHash::of(text.as_bytes())
 }
 
 /// A typed program: its layout, its routines with the lines that a fault names, and its initial state. The names and types of its variables are in it,

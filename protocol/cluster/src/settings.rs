@@ -9,7 +9,7 @@ use understudy_remote_io::{
 };
 use understudy_wire::{Image, Member, Moment, PointsHash, ProgramId, StationId};
 
-use crate::canonical::points_text;
+use crate::canonical::points_hash;
 use crate::cluster::{Cluster, RemoteIo, Twin};
 use crate::undriven::initial_image;
 
@@ -88,8 +88,7 @@ impl Cluster {
 
     /// Identifies the points of a program, to its remote I/O; nothing where the cluster has no such program.
     pub fn points_hash(&self, program: ProgramId) -> Option<PointsHash> {
-        let controller = self.controllers.get(program.index())?;
-        Some(PointsHash::of(points_text(&controller.interface).as_bytes()))
+        Some(points_hash(&self.controllers.get(program.index())?.interface))
     }
 
     /// What the second remote I/O of a program is told when it starts; nothing where the program has none.

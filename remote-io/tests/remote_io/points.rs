@@ -55,6 +55,7 @@ fn change() -> Arc<OnlineChange> {
 /// The same with these layouts.
 fn change_between(old: Arc<Layout>, new: Layout) -> Arc<OnlineChange> {
     let before = settings(1);
+    let known_by = [old.hash, new.hash];
     let after = Fallback { fail_safe: Image::from_bits([true; 2]), ..before.fallback.clone() };
     Arc::new(OnlineChange {
         before: ConfigurationHash(2),
@@ -71,6 +72,7 @@ fn change_between(old: Arc<Layout>, new: Layout) -> Arc<OnlineChange> {
                 inputs: vec![moved(0, 2), moved(1, 0)],
                 outputs: vec![moved(0, 1)],
             })),
+            known_by,
         }],
         fallbacks: vec![FallbackChange { program: PROGRAM, before: before.fallback, after }],
     })
@@ -320,6 +322,37 @@ fn an_order_is_for_the_points_by_which_its_signal_was_found() {
     plant.order(&ChangeOrder::Switch(change.name(), OLD));
     plant.cycle(Some(&[true]), Some(AFTER));
     check(&mut plant, [true, false, false]);
+}
+
+/// A change that leaves the points, and names a value of an enumeration in another way: who has either file means them. When it is over, who has the old
+/// one does not know what his values mean.
+#[test]
+fn points_that_stay_are_known_by_both_files() {
+    let mut plant = Plant::running();
+    let (old, new) = (settings(1).layout.hash, PointsHash(99));
+    let mut change = OnlineChange::clone(&change());
+    change.fallbacks.clear();
+    let changed = &mut change.programs[0];
+    changed.after = program(NEW, &["one", "two"], &["y"]);
+    (changed.points, changed.known_by) = (None, [old, new]);
+    let name = change.name();
+    let check = |plant: &mut Plant, expected: [bool; 4]| {
+        let points = [None, Some(old), Some(new), Some(PointsHash(5))];
+        let found = points.map(|points| orders_by(plant, points)[0] == "done");
+        assert_eq!(found, expected);
+    };
+    check(&mut plant, [true, true, false, false]);
+    plant.order(&ChangeOrder::Prepare(Arc::new(change)));
+    check(&mut plant, [true, true, true, false]);
+    plant.cycle(Some(&[true]), Some(AFTER));
+    plant.order(&ChangeOrder::Switch(name, NEW));
+    for _ in 0..6 {
+        plant.cycle(Some(&[true]), Some(AFTER));
+        check(&mut plant, [true, true, true, false]);
+    }
+    plant.order(&ChangeOrder::Run(name, AFTER));
+    plant.order(&ChangeOrder::Forget(name, AFTER));
+    check(&mut plant, [true, false, true, false]);
 }
 
 /// A force of a signal that moved is not ended by who knows the place that another one had before.

@@ -471,6 +471,7 @@ fn a_program_is_judged_during_later_changes_of_others() {
         forward: way.clone(),
         back: way,
         points: None,
+        known_by: Default::default(),
     };
     referee.learn(&change(1, vec![program]));
     let mut lineage = Lineage::genesis(ProgramHash(5), moment(0));
