@@ -21,7 +21,9 @@ use understudy_member::tls_keys;
 use understudy_text::visible_json;
 use understudy_typed::Declared;
 use understudy_view::{Run, find_running_of};
-use understudy_wire::{Cycle, Force, Member, Role, SignalPlace, StateChoice, Write, WriteAnswer};
+use understudy_wire::{
+    Cycle, Force, Member, PointsHash, Role, SignalPlace, StateChoice, Unforce, Write, WriteAnswer,
+};
 
 use crate::answer::{Answer, Failure, Status};
 use crate::files;
@@ -201,9 +203,7 @@ fn command(arguments: &Arguments, owner: &str) -> Result<Command, Answer> {
     let word = arguments.word();
     Ok(match arguments.what {
         What::Force => Command::Force(force(arguments, written(arguments)?.cluster(), owner)?),
-        What::Unforce => {
-            Command::Unforce { signal: place(arguments, written(arguments)?.cluster())?.0 }
-        }
+        What::Unforce => Command::Unforce(unforce(arguments, written(arguments)?.cluster())?),
         What::Write => Command::Write(write(
             arguments,
             written(arguments)?.cluster(),
@@ -239,11 +239,17 @@ fn named(arguments: &Arguments) -> Result<Member, Answer> {
     crate::member::find(&cluster, &arguments.name)
 }
 
-/// The forced signal: its place, its declaration, and the text of its value.
-fn place<'a>(
-    arguments: &'a Arguments,
-    cluster: &Cluster,
-) -> Result<(SignalPlace, Declared, &'a str), Answer> {
+/// The signal of a force, as the cluster file has it.
+struct Named<'a> {
+    signal: SignalPlace,
+    declared: Declared,
+    points: Option<PointsHash>,
+    /// The text of its value.
+    value: &'a str,
+}
+
+/// The signal that is forced, or whose force ends.
+fn named_signal<'a>(arguments: &'a Arguments, cluster: &Cluster) -> Result<Named<'a>, Answer> {
     let text = arguments.signal.as_deref().unwrap_or_default();
     let (name, value) = text.split_once('=').unwrap_or((text, ""));
     let bad = |message: String| Answer::failed(Status::BadInput, "U0556", message);
@@ -256,7 +262,7 @@ fn place<'a>(
     let name = name.trim();
     let input = inputs.find(name).map(|point| (SignalPlace::Input(point.bit as u16), point));
     let output = outputs.find(name).map(|point| (SignalPlace::Output(point.bit as u16), point));
-    let (place, point) = input.or(output).ok_or_else(|| {
+    let (signal, point) = input.or(output).ok_or_else(|| {
         let names: Vec<&str> = inputs.names().chain(outputs.names()).collect();
         let names = names.join(", ");
         bad(format!(
@@ -264,13 +270,20 @@ fn place<'a>(
             arguments.name
         ))
     })?;
-    Ok((place, point.declared(), value.trim()))
+    let points = cluster.points_hash(program);
+    Ok(Named { signal, declared: point.declared(), points, value: value.trim() })
+}
+
+/// The end of a force of a signal.
+fn unforce(arguments: &Arguments, cluster: &Cluster) -> Result<Unforce, Answer> {
+    let Named { signal, points, .. } = named_signal(arguments, cluster)?;
+    Ok(Unforce { signal, points })
 }
 
 /// A force of a signal as a whole.
 fn force(arguments: &Arguments, cluster: &Cluster, owner: &str) -> Result<Force, Answer> {
-    let (signal, declared, text) = place(arguments, cluster)?;
-    let value = force_value(text, &declared)
+    let Named { signal, declared, points, value } = named_signal(arguments, cluster)?;
+    let value = force_value(value, &declared)
         .map_err(|message| Answer::failed(Status::BadInput, "U0556", message))?;
     let force = Force {
         signal,
@@ -278,6 +291,7 @@ fn force(arguments: &Arguments, cluster: &Cluster, owner: &str) -> Result<Force,
         seconds: arguments.seconds,
         owner: owner.to_owned(),
         reason: arguments.reason.clone(),
+        points,
     };
     force.check().map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
     Ok(force)
@@ -401,7 +415,7 @@ fn request(
         What::Release => Some(Request::Release),
         What::ColdStart | What::AcceptState => Some(Request::Choose(arguments.choice())),
         What::Force => Some(Request::Force(force(arguments, cluster, person.0)?)),
-        What::Unforce => Some(Request::Unforce(place(arguments, cluster)?.0)),
+        What::Unforce => Some(Request::Unforce(unforce(arguments, cluster)?)),
         What::Write => Some(Request::Write(write(arguments, cluster, person)?)),
         What::Stop => Some(Request::Stop),
         What::Journal => None,

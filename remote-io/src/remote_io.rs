@@ -317,7 +317,7 @@ impl RemoteIo {
             RemoteIoInput::Choose(choice) => self.choose(choice),
             RemoteIoInput::Release => self.release(),
             RemoteIoInput::Force(force) => self.force(now, force),
-            RemoteIoInput::Unforce(signal) => self.unforce(signal),
+            RemoteIoInput::Unforce(unforce) => self.unforce(unforce),
             RemoteIoInput::Write(write) => self.write(now, write),
         }
     }

@@ -18,7 +18,7 @@ use understudy_remote_io::{
 use understudy_typed::Elementary;
 use understudy_wire::{
     Body, Force, Holding, Image, PointValue, Role, Sample, SignalPlace, Source, StateChoice, Time,
-    Write, WriteId,
+    Unforce, Write, WriteId,
 };
 
 #[global_allocator]
@@ -101,11 +101,12 @@ impl Plant {
         let moment = self.bench.moment();
         let start = self.bench.start();
         let (field, force) = (Image::zero(self.width), force());
+        let unforce = Unforce { signal: force.signal, points: None };
         let order = match at {
             300 => Some(RemoteIoInput::FieldLost),
             310 => Some(RemoteIoInput::Field(&field)),
             400 => Some(RemoteIoInput::Force(&force)),
-            450 => Some(RemoteIoInput::Unforce(SignalPlace::Input(0))),
+            450 => Some(RemoteIoInput::Unforce(&unforce)),
             500 => Some(RemoteIoInput::Write(write)),
             620 | 730 => Some(RemoteIoInput::Release),
             740 => Some(RemoteIoInput::Choose(StateChoice::Cold)),
@@ -176,7 +177,14 @@ fn applied(output: &Output<Event>) -> Option<Source> {
 fn force() -> Force {
     let signal = SignalPlace::Input(0);
     let value = PointValue::Bit(true);
-    Force { signal, value, seconds: 3600, owner: "anna".into(), reason: "a test".into() }
+    Force {
+        signal,
+        value,
+        seconds: 3600,
+        owner: "anna".into(),
+        reason: "a test".into(),
+        points: None,
+    }
 }
 
 /// Input 1 is written.
@@ -188,6 +196,7 @@ fn write(number: u32) -> Write {
         role: Role::Operator,
         owner: "anna".into(),
         reason: "a test".into(),
+        points: None,
     }
 }
 

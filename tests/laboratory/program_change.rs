@@ -458,6 +458,7 @@ fn a_setpoint_keeps_its_value_when_the_program_has_changed() {
         role: Role::Operator,
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),
+        points: None,
     };
     plant.order("counter-io", &format!("write {}", serde_json::to_string(&write).expect("JSON")));
     plant.applied(16, |shown| shown == 42);

@@ -75,6 +75,7 @@ fn press(run: &Path, writer: u16, over: &AtomicBool) -> u32 {
             role: Role::Operator,
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
+            points: None,
         };
         let deadline = Instant::now() + DEADLINE;
         loop {

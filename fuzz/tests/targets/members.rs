@@ -8,8 +8,8 @@ use understudy_remote_io::RemoteIo;
 use understudy_seal::{ClusterSecret, Opener, Revocations, Seal, Title};
 use understudy_testing::press_cell;
 use understudy_wire::{
-    ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, Roster, SignalPlace, StationId,
-    Time, decode, encode,
+    ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, Roster, StationId, Time, Unforce,
+    decode, encode,
 };
 
 use crate::attack::attack;
@@ -109,8 +109,8 @@ fn force() {
                 if force.check().is_ok() {
                     remote_io.handle_input(Time(1), Input::RemoteIo(RemoteIoInput::Force(&force)));
                 }
-            } else if let Ok(place) = serde_json::from_slice::<SignalPlace>(line) {
-                remote_io.handle_input(Time(1), Input::RemoteIo(RemoteIoInput::Unforce(place)));
+            } else if let Ok(unforce) = serde_json::from_slice::<Unforce>(line) {
+                remote_io.handle_input(Time(1), Input::RemoteIo(RemoteIoInput::Unforce(&unforce)));
             }
         }
         for _ in 0..16 {

@@ -30,7 +30,7 @@ use understudy_journal::{
     RunSocket, commands as queue_of_commands, keep_cluster, monotonic_ns,
 };
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{ConfigurationHash, Member};
+use understudy_wire::{ConfigurationHash, Member, PointsHash, ProgramId};
 
 use understudy_scenarios::{Account, OriginRule, Scenario, Terms};
 
@@ -222,6 +222,7 @@ fn run(
         afterwards,
         judged: None,
         commanded: commands.is_some(),
+        points: (0..).map_while(|program| cluster.points_hash(ProgramId(program))).collect(),
         orders: PendingOrders::default(),
         // Less than a member takes, so that each caller gets an answer.
         write_limiter: WriteLimiter::new(WRITES_PER_SECOND / 2),
@@ -292,6 +293,8 @@ struct Laboratory<'w> {
     judged: Option<Account>,
     /// Whether somebody gives commands, or said that he might.
     commanded: bool,
+    /// By program: identifies the points that steps of the scenario mean.
+    points: Vec<PointsHash>,
     orders: PendingOrders,
     write_limiter: WriteLimiter,
     /// The configuration of the online change that the journal knows.

@@ -23,7 +23,7 @@ impl Laboratory<'_> {
             command,
             Command::Write(_)
                 | Command::Force(_)
-                | Command::Unforce { .. }
+                | Command::Unforce(_)
                 | Command::Choose { .. }
                 | Command::Release
                 | Command::Change { .. }
@@ -80,7 +80,7 @@ impl Laboratory<'_> {
             | Command::Choose { .. }
             | Command::Force(_)
             | Command::Write(_)
-            | Command::Unforce { .. }
+            | Command::Unforce(_)
                 if !remote_io =>
             {
                 Some(wrong("it is for remote I/Os"))
@@ -124,8 +124,8 @@ impl Laboratory<'_> {
             Command::Change { request } => {
                 return self.tell(member, line("change", serde_json::to_string(request))).await;
             }
-            Command::Unforce { signal } => {
-                return self.tell(member, line("unforce", serde_json::to_string(signal))).await;
+            Command::Unforce(unforce) => {
+                return self.tell(member, line("unforce", serde_json::to_string(unforce))).await;
             }
         };
         self.act(member, action).await

@@ -10,7 +10,7 @@ use understudy_bus::{Cuts, HostEvent, log_environment, zenoh_runtime};
 use understudy_journal::{Happening, Record, RunEvent, check_version};
 use understudy_scenarios::{action_text, action_word};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Member, SignalPlace, Via};
+use understudy_wire::{Member, SignalPlace, Unforce, Via};
 
 use super::{Deaths, Laboratory, Progress};
 use crate::error::LaboratoryError;
@@ -212,6 +212,8 @@ impl Laboratory<'_> {
             self.show_step(format!("{name}: no {action}: {why}"));
             return Ok(false);
         }
+        let points = step.member.sampled_program();
+        let points = points.and_then(|program| self.points.get(program.index()).copied());
         let done = match (step.action, self.processes.get_mut(&step.member)) {
             (Action::Restart, _) => {
                 self.start(step.member).await?;
@@ -226,17 +228,17 @@ impl Laboratory<'_> {
             (Action::Continue, Some(process)) => process.go_on(),
             (Action::Release, Some(process)) => process.command("release").await,
             (Action::Write { .. }, Some(process)) => {
-                let write = step.write().and_then(|write| serde_json::to_string(&write).ok());
+                let write = step.write(points).and_then(|write| serde_json::to_string(&write).ok());
                 process.command(&format!("write {}", write.unwrap_or_default())).await
             }
             (Action::Set { .. }, Some(process)) => {
-                let force = step.action.force();
+                let force = step.action.force(points);
                 let line = serde_json::to_string(&force).map(|it| format!("force {it}"));
                 process.command(&line.unwrap_or_default()).await
             }
             (Action::Unset { input }, Some(process)) => {
-                let signal = SignalPlace::Input(input);
-                let line = serde_json::to_string(&signal).map(|it| format!("unforce {it}"));
+                let unforce = Unforce { signal: SignalPlace::Input(input), points };
+                let line = serde_json::to_string(&unforce).map(|it| format!("unforce {it}"));
                 process.command(&line.unwrap_or_default()).await
             }
             (Action::Choose { choice }, Some(process)) => {

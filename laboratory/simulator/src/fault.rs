@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{
-    Force, MAXIMUM_FORCE_SECONDS, Member, PointValue, ProgramHash, ProgramId, Role, SignalPlace,
-    StateChoice, Via, Write, WriteId,
+    Force, MAXIMUM_FORCE_SECONDS, Member, PointValue, PointsHash, ProgramHash, ProgramId, Role,
+    SignalPlace, StateChoice, Via, Write, WriteId,
 };
 
 /// One thing done to one member.
@@ -176,8 +176,8 @@ pub enum Action {
 }
 
 impl Fault {
-    /// The request of a [`Action::Write`]: each step writes in a session of its own.
-    pub fn write(&self) -> Option<Write> {
+    /// The request of a [`Action::Write`] by a person who knows these points: each step writes in a session of its own.
+    pub fn write(&self, points: Option<PointsHash>) -> Option<Write> {
         let Action::Write { input, value } = self.action else {
             return None;
         };
@@ -189,13 +189,14 @@ impl Fault {
             role: Role::Engineer,
             owner: "scenario".to_owned(),
             reason: format!("step at cycle {}", self.at_cycle),
+            points,
         })
     }
 }
 
 impl Action {
-    /// The force of a [`Self::Set`].
-    pub fn force(self) -> Option<Force> {
+    /// The force of a [`Self::Set`] by a person who knows these points.
+    pub fn force(self, points: Option<PointsHash>) -> Option<Force> {
         let Self::Set { input, value } = self else {
             return None;
         };
@@ -205,6 +206,7 @@ impl Action {
             seconds: MAXIMUM_FORCE_SECONDS,
             owner: "scenario".to_owned(),
             reason: "step of the scenario".to_owned(),
+            points,
         })
     }
 

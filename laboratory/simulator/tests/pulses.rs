@@ -85,6 +85,7 @@ impl Bench {
             role: Role::Operator,
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
+            points: None,
         };
         self.simulation.order(PROGRAM, RemoteIoInput::Write(&write), &mut |_, _, _, _| {});
     }

@@ -92,6 +92,7 @@ fn write(session: u64, number: u32, input: u16, value: PointValue) -> Write {
         role: Role::Operator,
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),
+        points: None,
     }
 }
 

@@ -302,7 +302,7 @@ impl Recorder {
             Command::Force(force) => Request::Force(force.clone()),
             // Handled before, because its outcome takes cycles.
             Command::Write(_) => return Err(Refusal::Busy),
-            Command::Unforce { signal } => Request::Unforce(*signal),
+            Command::Unforce(unforce) => Request::Unforce(*unforce),
             Command::Change { request: ChangeRequest::Prepare { .. } } => {
                 return Err(elsewhere("`understudy change` sends the texts to its machine"));
             }

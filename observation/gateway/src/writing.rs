@@ -210,6 +210,7 @@ mod tests {
             role: Role::Operator,
             owner: format!("client {number}"),
             reason: "a test".to_owned(),
+            points: None,
         };
         (write, Some(id))
     }

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, oneshot};
 use understudy_wire::{
-    ChangeRequest, Force, Member, OrderRefusal, SignalPlace, StateChoice, Write, WriteOutcome,
+    ChangeRequest, Force, Member, OrderRefusal, StateChoice, Unforce, Write, WriteOutcome,
     WriteRefusal,
 };
 
@@ -73,10 +73,7 @@ pub enum Command {
         request: ChangeRequest,
     },
     /// Take it back.
-    Unforce {
-        /// Which signal.
-        signal: SignalPlace,
-    },
+    Unforce(Unforce),
 }
 
 /// Why a command was not done.

@@ -3,8 +3,10 @@
 
 use std::fmt::Write;
 
+use understudy_executable::Interface;
 use understudy_logic::{Circuit, Expression, Operation, Variable};
 use understudy_typed::Program as TypedProgram;
+use understudy_wire::PointsHash;
 
 /// A circuit, line by line: its inputs, registers with initial values, outputs, and the operations that they reach; and the registers that a warm
 /// start keeps, `retentive`, where there are any.
@@ -39,6 +41,26 @@ pub(crate) fn circuit_text(circuit: &Circuit, retentive: &[u64]) -> String {
         }
     }
     walk.text
+}
+
+/// Identifies the points of a program: by names, places, types with their subranges, and the names of values.
+pub(crate) fn points_hash(Interface { inputs, outputs }: &Interface) -> PointsHash {
+    let mut text = String::new();
+    let sides = [("input", inputs), ("output", outputs)];
+    let points =
+        sides.into_iter().flat_map(|(side, points)| points.iter().map(move |it| (side, it)));
+    for (side, point) in points {
+        // Writing to a text cannot fail.
+        let _ = write!(text, "{side} {} at {} {}", point.name, point.bit, point.of);
+        if let Some((low, high)) = point.range {
+            let _ = write!(text, " {low}..{high}");
+        }
+        for (name, value) in point.values.iter().flat_map(|known| &known.values) {
+            let _ = write!(text, " {name}={value}");
+        }
+        text.push('\n');
+    }
+    PointsHash::of(text.as_bytes())
 }
 
 /// A typed program: its layout, its routines with the lines that a fault names, and its initial state. The names and types of its variables are in it,

@@ -25,6 +25,7 @@ pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_p
 pub use self::points::{ChangedPoints, FixedPoints, change_with_points};
 pub use self::settings::ChangedSetting;
 pub use self::unfit::{PairReason, Unfit};
+use crate::canonical::points_hash;
 use crate::cluster::{Cluster, Controller};
 use crate::code::Code;
 use crate::configuration::{fallback_text, filled};
@@ -295,6 +296,7 @@ impl ChangeTexts {
                 forward: Arc::new(Between::new(&before, &after)),
                 back: Arc::new(Between::new(&after, &before)),
                 points: None,
+                known_by: [&before, &after].map(|code| points_hash(&code.interface())),
             });
         }
         let fallbacks = self.load_fallbacks(cluster)?;

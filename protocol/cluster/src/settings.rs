@@ -7,8 +7,9 @@ use understudy_cycle::Mode;
 use understudy_remote_io::{
     Channel, Layout, PairSettings, PointPlace, SharedOutputs, SignalSource,
 };
-use understudy_wire::{Image, Member, Moment, ProgramId, StationId};
+use understudy_wire::{Image, Member, Moment, PointsHash, ProgramId, StationId};
 
+use crate::canonical::points_hash;
 use crate::cluster::{Cluster, RemoteIo, Twin};
 use crate::undriven::initial_image;
 
@@ -73,6 +74,7 @@ impl Cluster {
         let controller = self.controllers.get(program.index())?;
         let (inputs, outputs) = (&controller.interface.inputs, &controller.interface.outputs);
         Some(Layout {
+            hash: self.points_hash(program)?,
             undriven: initial_image(inputs),
             input_points: inputs.iter().map(PointPlace::of).collect(),
             output_points: outputs.iter().map(PointPlace::of).collect(),
@@ -82,6 +84,11 @@ impl Cluster {
             channels: Channel::of_inputs(&inputs.bit_names()),
             stop: controller.stop_points(),
         })
+    }
+
+    /// Identifies the points of a program, to its remote I/O; nothing where the cluster has no such program.
+    pub fn points_hash(&self, program: ProgramId) -> Option<PointsHash> {
+        Some(points_hash(&self.controllers.get(program.index())?.interface))
     }
 
     /// What the second remote I/O of a program is told when it starts; nothing where the program has none.

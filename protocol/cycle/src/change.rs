@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use understudy_executable::Executable;
 use understudy_wire::{
-    ChangeName, ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId,
+    ChangeName, ConfigurationHash, Configurations, OrderRefusal, PointsHash, ProgramHash, ProgramId,
 };
 
 use crate::fallback::Fallback;
@@ -57,9 +57,21 @@ pub struct ProgramChange {
     pub back: Arc<dyn Conversion>,
     /// What becomes of its points; `None` where both programs have the same ones. The change has the settings of its remote I/O too then.
     pub points: Option<Arc<PointsChange>>,
+    /// What identifies the points of `before` and of `after` to who gives orders. Where these stay, values of an enumeration may have other names.
+    pub known_by: [PointsHash; 2],
 }
 
 impl ProgramChange {
+    /// What identifies the points of one of the two programs to who gives orders.
+    pub fn known_by(&self, version: ProgramHash) -> Option<PointsHash> {
+        let [before, after] = self.known_by;
+        match version {
+            _ if version == self.before.hash => Some(before),
+            _ if version == self.after.hash => Some(after),
+            _ => None,
+        }
+    }
+
     /// The way of the points from one of the two programs to the other one; nothing where they stay.
     fn passage(&self, from: ProgramHash, to: ProgramHash) -> Option<Passage<'_>> {
         let points = self.points.as_ref()?;

@@ -1,6 +1,6 @@
 //! The points of a program, as its remote I/O samples and drives them.
 
-use understudy_wire::Image;
+use understudy_wire::{Image, PointsHash};
 
 use crate::channel::{self, Channel};
 use crate::place::PointPlace;
@@ -10,6 +10,8 @@ use crate::source::{OperatorInput, SignalInput, SignalSource};
 /// marks of a history tell which layout each of its samples has.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Layout {
+    /// Identifies the points, also by their names: who gives an order for one of them says which he means.
+    pub hash: PointsHash,
     /// u(i) where nothing drives it: the initial values of its variables.
     pub undriven: Image,
     /// Signals of u(i), in the order of their bits.
@@ -41,6 +43,7 @@ impl Layout {
     /// BOOLs alone, all of the field, with the initial value FALSE.
     pub fn booleans(inputs: u16, outputs: u16) -> Self {
         Self {
+            hash: PointsHash(u64::from(inputs) << 16 | u64::from(outputs)),
             undriven: Image::zero(usize::from(inputs)),
             input_points: PointPlace::booleans(inputs),
             output_points: PointPlace::booleans(outputs),

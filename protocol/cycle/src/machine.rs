@@ -11,7 +11,7 @@ use crate::change::ChangeOrder;
 
 use understudy_wire::{
     ConfigurationHash, Configurations, Force, Frame, Image, OrderRefusal, ProgramHash, Retained,
-    SignalPlace, StateChoice, Time, Write, WriteAnswer,
+    StateChoice, Time, Unforce, Write, WriteAnswer,
 };
 
 /// An input of a member.
@@ -43,7 +43,7 @@ pub enum RemoteIoInput<'a> {
     /// The operator forces a signal.
     Force(&'a Force),
     /// The operator removes a force.
-    Unforce(SignalPlace),
+    Unforce(&'a Unforce),
     /// An operator writes a value.
     Write(&'a Write),
 }

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::identifier::{ConfigurationHash, Moment};
+use crate::identifier::{ConfigurationHash, Moment, PointsHash};
 use crate::set::StationSet;
 
 /// Maximum duration of one force, in seconds.
@@ -115,7 +115,24 @@ pub struct Force {
     pub owner: String,
     /// Reason.
     pub reason: String,
+    /// Points by which the signal was found; nothing where the caller does not know them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointsHash>,
 }
+
+/// The end of a force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Unforce {
+    /// Signal that has its own value again.
+    pub signal: SignalPlace,
+    /// As [`Force::points`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointsHash>,
+}
+
+/// Why a signal is not taken for the one that the caller has named, where an online change has replaced inputs or outputs.
+pub(crate) const OTHER_POINTS: &str = "the signal was found by other inputs and outputs than those of the program that runs, which an online change has replaced or may replace: \
+     use the cluster file with which the program runs, and repeat the order";
 
 /// Reason why a force is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -157,6 +174,9 @@ pub enum OrderRefusal {
     /// The signal is not forced.
     #[error("the signal is not forced")]
     NotForced,
+    /// The signal was found by other points than those that count.
+    #[error("{OTHER_POINTS}")]
+    OtherPoints,
     /// The other remote I/O of the program is the author.
     #[error("this remote I/O follows the other one of its program: give the order to that one")]
     NotAuthor,
@@ -228,6 +248,7 @@ impl OrderRefusal {
         match self {
             Self::NoSignal | Self::Value { .. } | Self::Incomplete | Self::NotForced => "U0556",
             Self::NotAuthor => "U0556",
+            Self::OtherPoints => "U0638",
             Self::NoChoice | Self::WaitsForChoice | Self::NoState | Self::OtherState { .. } => {
                 "U0583"
             }
@@ -305,6 +326,7 @@ mod tests {
                 seconds,
                 owner: owner.to_owned(),
                 reason: reason.to_owned(),
+                points: None,
             };
             assert_eq!(force.check(), expected, "{force:?}");
         };
@@ -330,6 +352,7 @@ mod tests {
                 seconds: 1,
                 owner: "anna".to_owned(),
                 reason: "why".to_owned(),
+                points: None,
             };
             assert_eq!(serde_json::to_string(&force.value).expect("JSON"), text);
             assert_eq!(force.check(), expected, "{force:?}");
@@ -351,6 +374,7 @@ mod tests {
             seconds: 1,
             owner: "anna".to_owned(),
             reason: "why".to_owned(),
+            points: None,
         };
         let number = PointValue::Number { width: 32, stored: 0 };
         let wide = force(SignalPlace::Input(32), number);

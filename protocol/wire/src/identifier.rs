@@ -152,6 +152,8 @@ hashes! {
     ConfigurationHash;
     /// Identifies one program's circuit.
     ProgramHash;
+    /// Identifies the inputs and outputs of one program: their names, types and places.
+    PointsHash;
     /// Identifies the authority that issued the keys of a member, by its certificate.
     AuthorityHash;
 }

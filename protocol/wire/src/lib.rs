@@ -24,7 +24,7 @@ pub use change::{ChangeName, ChangeRequest};
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
     Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,
-    OrderRefusal, PointValue, SignalPlace, check_owner_and_reason,
+    OrderRefusal, PointValue, SignalPlace, Unforce, check_owner_and_reason,
 };
 pub use frame::{
     Actuation, Body, Configurations, Field, Frame, Header, Holding, Join, Kept,
@@ -33,7 +33,7 @@ pub use frame::{
 };
 pub use identifier::{
     AuthorityHash, ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS,
-    MAXIMUM_STATIONS, Member, Moment, ProgramHash, ProgramId, StationId,
+    MAXIMUM_STATIONS, Member, Moment, PointsHash, ProgramHash, ProgramId, StationId,
 };
 pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS, MAXIMUM_STATE_BITS};
 pub use lineage::{Digest, Lineage};

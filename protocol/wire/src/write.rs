@@ -7,8 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::force::{ForceError, PointValue, check_owner_and_reason};
-use crate::identifier::Moment;
+use crate::force::{ForceError, OTHER_POINTS, PointValue, check_owner_and_reason};
+use crate::identifier::{Moment, PointsHash};
 
 /// Sessions whose newest write a sample carries: the undecided, and then the newest.
 pub const MAXIMUM_SESSIONS: usize = 16;
@@ -95,6 +95,9 @@ pub struct Write {
     pub owner: String,
     /// Reason.
     pub reason: String,
+    /// Points by which the input was found; nothing where the caller does not know them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointsHash>,
 }
 
 impl Write {
@@ -140,6 +143,9 @@ pub enum WriteRefusal {
     /// The program has no operator input there.
     #[error("the input is not declared as an operator input in the cluster file")]
     NotWritable,
+    /// The input was found by other points than those that count.
+    #[error("{OTHER_POINTS}")]
+    OtherPoints,
     /// The value has another type than the input.
     #[error("the value has another type than the input")]
     Type,
@@ -184,6 +190,7 @@ impl WriteRefusal {
     pub fn code(self) -> &'static str {
         match self {
             Self::NotWritable => "U0640",
+            Self::OtherPoints => "U0638",
             Self::Type => "U0641",
             Self::Limits => "U0642",
             Self::Role { .. } => "U0643",

@@ -4,7 +4,9 @@
 
 use std::time::Duration;
 
-use understudy_wire::{Force, Image, OrderRefusal, PointValue, SignalPlace, Time, WriteRefusal};
+use understudy_wire::{
+    Force, Image, OrderRefusal, PointValue, SignalPlace, Time, Unforce, WriteRefusal,
+};
 
 use super::RemoteIo;
 use crate::event::Event;
@@ -96,6 +98,9 @@ impl RemoteIo {
         if force.check().is_err() {
             return Some(OrderRefusal::Incomplete);
         }
+        if !self.counts_by(force.points) {
+            return Some(OrderRefusal::OtherPoints);
+        }
         let points = match force.signal {
             SignalPlace::Input(_) => &self.layout.input_points,
             SignalPlace::Output(_) => &self.layout.output_points,
@@ -124,12 +129,16 @@ impl RemoteIo {
         self.obeyed(Ok(()));
     }
 
-    pub(super) fn unforce(&mut self, signal: SignalPlace) {
-        if self.forcing.remove(signal) {
-            self.report_unforced(signal, false);
-            return self.obeyed(Ok(()));
-        }
-        let refusal = OrderRefusal::NotForced;
+    /// Ends a force, or refuses that.
+    pub(super) fn unforce(&mut self, &Unforce { signal, points }: &Unforce) {
+        let refusal = match self.counts_by(points) {
+            true if self.forcing.remove(signal) => {
+                self.report_unforced(signal, false);
+                return self.obeyed(Ok(()));
+            }
+            true => OrderRefusal::NotForced,
+            false => OrderRefusal::OtherPoints,
+        };
         self.report(Event::UnforceRefused { moment: self.moment(), signal, refusal });
         self.obeyed(Err(refusal));
     }
@@ -157,7 +166,8 @@ mod tests {
     use super::*;
 
     fn force(signal: SignalPlace, value: PointValue) -> Force {
-        Force { signal, value, seconds: 1, owner: "anna".to_owned(), reason: "a test".to_owned() }
+        let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+        Force { signal, value, seconds: 1, owner, reason, points: None }
     }
 
     #[test]

@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use understudy_cycle::{Layout, OnlineChange, Output, Passage};
-use understudy_wire::{Header, Holding, Image, ProgramHash, Recalled};
+use understudy_wire::{Header, Holding, Image, PointsHash, ProgramHash, Recalled};
 
 use super::{Execution, RemoteIo};
 use crate::event::Event;
@@ -107,6 +107,21 @@ impl RemoteIo {
         recalled
     }
 
+    /// Whether a signal that was found by these points is the one that has its place now. Who says nothing of points means those that count, as long as no
+    /// loaded change can replace them. A change that leaves them has two names for them.
+    pub(super) fn counts_by(&self, points: Option<PointsHash>) -> bool {
+        let change = self.member.changing().change();
+        let change = change.and_then(|change| change.of(self.settings.program));
+        match (points, change) {
+            (None, _) => !self.replaces_points(),
+            (Some(points), _) if points == self.layout.hash => true,
+            (Some(points), Some(change)) => {
+                change.points.is_none() && change.known_by.contains(&points)
+            }
+            (Some(_), None) => false,
+        }
+    }
+
     /// The sensors show these values, by the points that the device is read by.
     pub(super) fn take_sensors(&mut self, sensors: &Image) {
         let Sensed { version, layout } = &self.sensed;
@@ -140,6 +155,7 @@ impl RemoteIo {
         let from = std::mem::replace(&mut self.laid_out, version);
         let program = self.settings.program;
         let Some(passage) = change.passage(program, (from, version)) else {
+            self.are_known_by(change.of(program).and_then(|change| change.known_by(version)));
             return false;
         };
         let moment = self.moment();
@@ -165,6 +181,18 @@ impl RemoteIo {
         self.report(Event::PointsChanged { moment, from, to: version });
         self.report_void(&void);
         true
+    }
+
+    /// The points stay, and are those of another version.
+    fn are_known_by(&mut self, points: Option<PointsHash>) {
+        let Some(hash) = points.filter(|points| *points != self.layout.hash) else {
+            return;
+        };
+        let is_read_by_them = self.sensed.layout == self.layout;
+        Arc::make_mut(&mut self.layout).hash = hash;
+        if is_read_by_them {
+            self.sensed.layout = Arc::clone(&self.layout);
+        }
     }
 
     /// Outputs that stay are held, and go to their fail-safe values, from where they are. New ones have their fail-safe values until they are proved.

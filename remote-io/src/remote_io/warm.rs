@@ -340,7 +340,7 @@ impl RemoteIo {
         if !retains || !self.is_first_start() {
             return None;
         }
-        let sampled = self.usable_note().map(|note| note.recalled.sampled);
+        let sampled = self.usable_note().map(|(note, _)| note.recalled.sampled);
         match sampled {
             None => Some(OldInputs::Initial),
             Some(sampled) => {
@@ -356,23 +356,23 @@ impl RemoteIo {
         matches!(self.knowledge, Knowledge::Listening { .. })
     }
 
-    /// The newest note that has the inputs of its program.
-    fn usable_note(&self) -> Option<&Note> {
-        let last = self.noting.last.as_ref();
-        last.filter(|note| {
-            let is_carried = !self.is_loaded(note.hash);
-            let version = self.named(Some(note.hash)).filter(|_| !is_carried);
-            // Values of another program were carried over to the points of the cluster file.
-            let is_known = !is_carried || !self.replaces_points();
-            is_known && self.has_width(&note.recalled.inputs, version)
-        })
+    /// The newest note that has the inputs of its program, with the version of the program whose points these are, where a change replaces them.
+    fn usable_note(&self) -> Option<(&Note, Option<ProgramHash>)> {
+        let note = self.noting.last.as_ref()?;
+        // Values of another program were taken over to the points of a version that is loaded.
+        let version = match self.is_loaded(note.hash) {
+            true => Some(note.hash),
+            false => note.recalled.version,
+        };
+        let version = self.named(version);
+        let is_known = version.is_some() || !self.replaces_points();
+        (is_known && self.has_width(&note.recalled.inputs, version)).then_some((note, version))
     }
 
     /// At the first start of this life, warm or cold: takes up the operator inputs that keep their values over a power failure, and the writes that
     /// were in effect.
     pub(super) fn take_up_writes(&mut self) {
-        let noted = self.usable_note().map(|note| {
-            let version = self.named(Some(note.hash));
+        let noted = self.usable_note().map(|(note, version)| {
             self.recalled_by_these_points(Recalled { version, ..note.recalled.clone() })
         });
         if let Some(recalled) = noted {

@@ -80,15 +80,17 @@ impl Writing {
         Self { values: values.collect(), sessions: Sessions::default() }
     }
 
-    /// What is known of a write that was taken before under its identifier.
+    /// What is known of a write that was taken before under its identifier. One that names its input by other points than those that `counts` is known by
+    /// its identifier alone: the input may have moved since.
     fn known(
         &self,
-        inputs: &[OperatorInput],
+        (inputs, counts): (&[OperatorInput], bool),
         write: &Write,
     ) -> Option<Result<Taking, WriteRefusal>> {
         let session = self.sessions.get(write.id.session).filter(|it| it.id == write.id)?;
+        let is_there = |input: usize| !counts || inputs[input].place.bit == write.input;
         let is_same = session.value.is_none_or(|value| value == write.value)
-            && session.input.is_none_or(|input| inputs[input].place.bit == write.input);
+            && session.input.is_none_or(is_there);
         Some(match session.progress {
             _ if !is_same => {
                 Err(WriteRefusal::Order { expected: write.id.number.saturating_add(1) })
@@ -468,8 +470,10 @@ impl RemoteIo {
             && self.question.is_none()
             && !self.applied.as_ref().is_some_and(Applied::is_of_no_station);
         let inputs = &self.layout.operator_inputs;
-        let taken = match self.writing.known(inputs, write) {
+        let counts = self.counts_by(write.points);
+        let taken = match self.writing.known((inputs, counts), write) {
             Some(known) => known,
+            None if !counts => Err(WriteRefusal::OtherPoints),
             None if runs => {
                 let forced = |input| self.forcing.refuses_write(input, now);
                 self.writing.take(inputs, write, &forced)

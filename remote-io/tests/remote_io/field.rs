@@ -9,7 +9,7 @@ use understudy_remote_io::{
 use understudy_typed::Elementary;
 use understudy_wire::{
     Body, Cycle, Force, Image, Lineage, OrderRefusal, PointValue, Role, SignalPlace, Source,
-    StateChoice, Time, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal,
+    StateChoice, Time, Unforce, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal,
 };
 
 use crate::bench::{Bench, PERIOD, Said, join, sample_of, settings};
@@ -60,6 +60,7 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
         seconds,
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),
+        points: None,
     };
     let (input, output) = (SignalPlace::Input(1), SignalPlace::Output(0));
     let mut said = bench.tell(RemoteIoInput::Force(&force(input, true, 1)));
@@ -90,8 +91,9 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
     let (fail_safe, forced) = (image(&[false]), image(&[true]));
     let both = (image(&[true, true]), forced.clone(), fail_safe.clone(), 0);
     assert_eq!(frames(&mut bench), both);
-    let mut said = bench.tell(RemoteIoInput::Unforce(output));
-    said.extend(bench.tell(RemoteIoInput::Unforce(output)));
+    let unforce = Unforce { signal: output, points: None };
+    let mut said = bench.tell(RemoteIoInput::Unforce(&unforce));
+    said.extend(bench.tell(RemoteIoInput::Unforce(&unforce)));
     assert_eq!(forced_and_ended(&said), (0, 1), "taken back once");
     let one = (image(&[true, true]), fail_safe.clone(), fail_safe.clone(), 0);
     assert_eq!(frames(&mut bench), one);
@@ -140,7 +142,7 @@ fn a_force_is_of_a_whole_signal_and_of_a_value_that_it_can_have() {
             {
                 let value = PointValue::new(width, stored);
                 let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
-                let force = Force { signal, value, seconds: 1, owner, reason };
+                let force = Force { signal, value, seconds: 1, owner, reason, points: None };
                 let is_number = match width {
                     32 => f32::from_bits(stored as u32).is_finite(),
                     64 => f64::from_bits(stored).is_finite(),
@@ -194,6 +196,7 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
         role: Role::Operator,
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),
+        points: None,
     };
     let said = bench.tell(RemoteIoInput::Write(&write));
     let refused = WriteOutcome::Refused { refusal: WriteRefusal::NotRunning };
@@ -209,10 +212,10 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
 #[test]
 fn an_order_that_changes_nothing_is_refused() {
     let mut bench = bench(settings(1));
-    let output = SignalPlace::Output(0);
+    let unforce = Unforce { signal: SignalPlace::Output(0), points: None };
     let no_choice = Err(OrderRefusal::NoChoice);
     for (input, expected) in [
-        (RemoteIoInput::Unforce(output), Err(OrderRefusal::NotForced)),
+        (RemoteIoInput::Unforce(&unforce), Err(OrderRefusal::NotForced)),
         (RemoteIoInput::Choose(StateChoice::Cold), no_choice),
         (RemoteIoInput::Choose(StateChoice::Newest { cycle: Some(Cycle(5)) }), no_choice),
         (RemoteIoInput::Release, Ok(())),

@@ -10,7 +10,7 @@ use understudy_remote_io::{
 use understudy_typed::Elementary;
 use understudy_wire::{
     Body, Force, Holding, Image, Lineage, Moment, PointValue, Recalled, Role, Sample, SignalPlace,
-    StateChoice, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal,
+    StateChoice, Unforce, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal,
 };
 
 use crate::bench::{
@@ -246,13 +246,15 @@ impl Operated {
         };
         let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
         let signal = SignalPlace::Input(place(self.kind).bit);
-        let force = Force { signal, value: self.value(stored), seconds: 60, owner, reason };
+        let force =
+            Force { signal, value: self.value(stored), seconds: 60, owner, reason, points: None };
         self.order(RemoteIoInput::Force(&force));
         self.forced = true;
     }
 
     fn unforce(&mut self) {
-        self.order(RemoteIoInput::Unforce(SignalPlace::Input(place(self.kind).bit)));
+        let signal = SignalPlace::Input(place(self.kind).bit);
+        self.order(RemoteIoInput::Unforce(&Unforce { signal, points: None }));
         self.forced = false;
     }
 
@@ -275,6 +277,7 @@ impl Operated {
             role: Role::Operator,
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
+            points: None,
         };
         self.order(RemoteIoInput::Write(&write));
     }

@@ -3,15 +3,17 @@
 use std::sync::Arc;
 
 use understudy_cycle::{
-    ChangeOrder, Conversion, FallbackChange, Input, Layout, Moved, OnlineChange, Output,
-    PointPlace, PointsChange, Program, ProgramChange, RemoteIoInput,
+    ChangeOrder, Conversion, FallbackChange, Input, Layout, Moved, OnlineChange, OperatorInput,
+    OperatorInputKind, Output, PointPlace, PointsChange, Program, ProgramChange, RemoteIoInput,
 };
 use understudy_logic::CircuitBuilder;
-use understudy_remote_io::{Event, Fallback, RemoteIo};
+use understudy_remote_io::{Event, Fallback, RemoteIo, Settings};
 use understudy_typed::Elementary;
 use understudy_wire::{
-    Body, ConfigurationHash, Cycle, Force, Frame, Header, Holding, Image, Moment, ProgramHash,
-    ProgramSet, Sample, SignalPlace, Source, Turn, Word,
+    Body, ClusterHash, ConfigurationHash, Configurations, Cycle, Force, Frame, Header, Holding,
+    Image, Lineage, Moment, Note, PointsHash, ProgramHash, ProgramSet, Recalled, Role, Sample,
+    SamplesReceived, SignalPlace, Source, StationSet, Turn, Unforce, Word, Write, WriteAnswer,
+    WriteId, WriteOutcome,
 };
 
 use crate::bench::{
@@ -47,7 +49,13 @@ fn moved(before: u16, after: u16) -> Moved {
 
 /// `one`, `two` and the output `y` become `two`, `more`, `one` and the outputs `z`, `y`; the new fail-safe values are TRUE.
 fn change() -> Arc<OnlineChange> {
+    change_between(settings(1).layout, Layout::booleans(3, 2))
+}
+
+/// The same with these layouts.
+fn change_between(old: Arc<Layout>, new: Layout) -> Arc<OnlineChange> {
     let before = settings(1);
+    let known_by = [old.hash, new.hash];
     let after = Fallback { fail_safe: Image::from_bits([true; 2]), ..before.fallback.clone() };
     Arc::new(OnlineChange {
         before: ConfigurationHash(2),
@@ -59,11 +67,12 @@ fn change() -> Arc<OnlineChange> {
             forward: Arc::new(Same),
             back: Arc::new(Same),
             points: Some(Arc::new(PointsChange {
-                before: before.layout,
-                after: Arc::new(Layout::booleans(3, 2)),
+                before: old,
+                after: Arc::new(new),
                 inputs: vec![moved(0, 2), moved(1, 0)],
                 outputs: vec![moved(0, 1)],
             })),
+            known_by,
         }],
         fallbacks: vec![FallbackChange { program: PROGRAM, before: before.fallback, after }],
     })
@@ -124,7 +133,7 @@ impl Plant {
     fn cycle(&mut self, outputs: Option<&[bool]>, prepared: Option<ConfigurationHash>) -> Seen {
         self.bench.cycle += 1;
         let mut seen = Seen::default();
-        let recalled = self.sample.as_ref().map(|(sample, moment)| understudy_wire::Recalled {
+        let recalled = self.sample.as_ref().map(|(sample, moment)| Recalled {
             version: sample.version,
             ..recalled_of(sample, *moment)
         });
@@ -164,12 +173,18 @@ impl Plant {
         self.bench.tell(RemoteIoInput::Field(&Image::from_bits(sensors.iter().copied())));
     }
 
-    /// Runs, has loaded the change, and is told to switch; `one` is shown, and `y` was driven.
-    fn about_to_switch() -> (Self, Arc<OnlineChange>) {
-        let (mut plant, change) = (Self::new(), change());
+    /// Runs; `one` is shown, and `y` was driven.
+    fn running() -> Self {
+        let mut plant = Self::new();
         plant.show(&[true, false]);
         let started = (0..60).any(|_| !plant.cycle(Some(&[true]), None).inputs.is_empty());
         assert!(started, "it starts cold");
+        plant
+    }
+
+    /// The same, has loaded the change, and is told to switch.
+    fn about_to_switch() -> (Self, Arc<OnlineChange>) {
+        let (mut plant, change) = (Self::running(), change());
         plant.order(&ChangeOrder::Prepare(Arc::clone(&change)));
         for _ in 0..3 {
             let seen = plant.cycle(Some(&[true]), Some(AFTER));
@@ -235,7 +250,8 @@ fn forces_end_with_the_points_that_they_are_of() {
     for (signal, is_input) in [(SignalPlace::Input(1), true), (SignalPlace::Output(0), false)] {
         let (mut plant, _) = Plant::about_to_switch();
         let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
-        let force = Force { signal, value: true.into(), seconds: 60, owner, reason };
+        let points = Some(settings(1).layout.hash);
+        let force = Force { signal, value: true.into(), seconds: 60, owner, reason, points };
         plant.bench.tell(RemoteIoInput::Force(&force));
         let seen = plant.cycle(Some(&[false, false]), Some(AFTER));
         let ended = |event: &Event| matches!(event, Event::Unforced { signal: of, expired: false, .. } if *of == signal);
@@ -244,6 +260,179 @@ fn forces_end_with_the_points_that_they_are_of() {
         let driven =
             seen.events.iter().any(|event| matches!(event, Event::Applied { driven: Some(_), .. }));
         assert!(!driven, "{is_input}");
+    }
+}
+
+/// What became of an order for a signal that was found by these points: a force of the first output, its end, and a write of the first input.
+fn orders_by(plant: &mut Plant, points: Option<PointsHash>) -> [String; 3] {
+    let signal = SignalPlace::Output(0);
+    let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+    let (id, role) = (WriteId { session: 1, number: 1 }, Role::Operator);
+    let write = Write {
+        id,
+        input: 0,
+        value: true.into(),
+        role,
+        owner: owner.clone(),
+        reason: reason.clone(),
+        points,
+    };
+    let force = Force { signal, value: true.into(), seconds: 60, owner, reason, points };
+    let unforce = Unforce { signal, points };
+    let orders = [
+        RemoteIoInput::Force(&force),
+        RemoteIoInput::Unforce(&unforce),
+        RemoteIoInput::Write(&write),
+    ];
+    orders.map(|order| {
+        let said = plant.bench.tell(order);
+        let outcome = said.iter().find_map(|output| match output {
+            Output::Obeyed(Ok(())) => Some("done".to_owned()),
+            Output::Obeyed(Err(refusal)) => Some(refusal.code().to_owned()),
+            Output::Answer(WriteAnswer { outcome: WriteOutcome::Refused { refusal }, .. }) => {
+                Some(refusal.code().to_owned())
+            }
+            _ => None,
+        });
+        outcome.unwrap_or_else(|| panic!("{said:?}"))
+    })
+}
+
+/// An order names its signal by a bit, which is of another signal after the change: only that of the points that count is taken, and without a word of points
+/// none as long as a change could replace them.
+#[test]
+fn an_order_is_for_the_points_by_which_its_signal_was_found() {
+    let [old, new] = [settings(1).layout.hash, Layout::booleans(3, 2).hash];
+    // The layouts have no operator inputs.
+    let [taken, refused] =
+        [["done", "done", "U0640"], ["U0638", "U0638", "U0638"]].map(|it| it.map(str::to_owned));
+    let check = |plant: &mut Plant, expected: [bool; 3]| {
+        for (points, is_taken) in [Some(old), Some(new), None].into_iter().zip(expected) {
+            let expected = if is_taken { &taken } else { &refused };
+            assert_eq!(orders_by(plant, points), *expected, "{points:?}");
+        }
+    };
+    check(&mut Plant::running(), [true, false, true]);
+    let (mut plant, change) = Plant::about_to_switch();
+    check(&mut plant, [true, false, false]);
+    plant.cycle(Some(&[true, false]), Some(AFTER));
+    check(&mut plant, [false, true, false]);
+    plant.order(&ChangeOrder::Run(change.name(), AFTER));
+    check(&mut plant, [false, true, false]);
+    plant.order(&ChangeOrder::Switch(change.name(), OLD));
+    plant.cycle(Some(&[true]), Some(AFTER));
+    check(&mut plant, [true, false, false]);
+}
+
+/// A change that leaves the points, and names a value of an enumeration in another way: who has either file means them. When it is over, who has the old
+/// one does not know what his values mean.
+#[test]
+fn points_that_stay_are_known_by_both_files() {
+    let mut plant = Plant::running();
+    let (old, new) = (settings(1).layout.hash, PointsHash(99));
+    let mut change = OnlineChange::clone(&change());
+    change.fallbacks.clear();
+    let changed = &mut change.programs[0];
+    changed.after = program(NEW, &["one", "two"], &["y"]);
+    (changed.points, changed.known_by) = (None, [old, new]);
+    let name = change.name();
+    let check = |plant: &mut Plant, expected: [bool; 4]| {
+        let points = [None, Some(old), Some(new), Some(PointsHash(5))];
+        let found = points.map(|points| orders_by(plant, points)[0] == "done");
+        assert_eq!(found, expected);
+    };
+    check(&mut plant, [true, true, false, false]);
+    plant.order(&ChangeOrder::Prepare(Arc::new(change)));
+    check(&mut plant, [true, true, true, false]);
+    plant.cycle(Some(&[true]), Some(AFTER));
+    plant.order(&ChangeOrder::Switch(name, NEW));
+    for _ in 0..6 {
+        plant.cycle(Some(&[true]), Some(AFTER));
+        check(&mut plant, [true, true, true, false]);
+    }
+    plant.order(&ChangeOrder::Run(name, AFTER));
+    plant.order(&ChangeOrder::Forget(name, AFTER));
+    check(&mut plant, [true, false, true, false]);
+}
+
+/// A force of a signal that moved is not ended by who knows the place that another one had before.
+#[test]
+fn only_who_knows_the_points_ends_a_force() {
+    let (mut plant, _) = Plant::about_to_switch();
+    plant.cycle(Some(&[true, false]), Some(AFTER));
+    let signal = SignalPlace::Output(0);
+    let [old, new] = [settings(1).layout.hash, Layout::booleans(3, 2).hash].map(Some);
+    let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+    let force = Force { signal, value: true.into(), seconds: 60, owner, reason, points: new };
+    plant.bench.tell(RemoteIoInput::Force(&force));
+    let driven = |seen: &Seen| {
+        let mut driven = seen.events.iter().filter_map(|event| match event {
+            Event::Applied { driven, .. } => driven.as_ref(),
+            _ => None,
+        });
+        driven.next().map(|image| image.bits().collect::<Vec<_>>())
+    };
+    for (points, expected) in
+        [(None, Some(vec![true, false])), (old, Some(vec![true, false])), (new, None)]
+    {
+        plant.bench.tell(RemoteIoInput::Unforce(&Unforce { signal, points }));
+        let seen = plant.cycle(Some(&[false, false]), Some(AFTER));
+        assert_eq!(driven(&seen), expected, "{points:?}");
+    }
+}
+
+/// The newest note is of a third program: the value of an input that keeps it was taken over to the points of one version of the change, and is found by
+/// those of the version that starts, wherever they are.
+#[test]
+fn a_value_of_a_third_program_is_found_by_the_points_that_count() {
+    let keeps = |bit| OperatorInput {
+        place: PointPlace { bit, of: Elementary::Bool },
+        kind: OperatorInputKind::Level,
+        role: Role::Operator,
+        initial: 0,
+        retains: true,
+    };
+    let of = |bit, inputs, outputs| Layout {
+        operator_inputs: vec![keeps(bit)],
+        ..Layout::booleans(inputs, outputs)
+    };
+    let (old, new) = (Arc::new(of(0, 2, 1)), of(2, 3, 2));
+    let change = change_between(Arc::clone(&old), new);
+    let (by_old, by_new) = (&[true, false][..], &[false, false, true][..]);
+    for (noted_by, inputs) in [(OLD, by_old), (NEW, by_new)] {
+        for (own, expected) in [(ConfigurationHash(2), by_old), (AFTER, by_new)] {
+            let settings = Settings { layout: Arc::clone(&old), ..settings(1) };
+            let mut plant = Plant { bench: Bench::new(settings, 100), sample: None };
+            let note = Note {
+                cluster: ClusterHash(1),
+                configuration: own,
+                hash: ProgramHash(77),
+                is_retentive: false,
+                number: 5,
+                lineage: Lineage(3),
+                begun: None,
+                recalled: Recalled {
+                    program: PROGRAM,
+                    sampled: Moment::default(),
+                    received: SamplesReceived::Later,
+                    applied: None,
+                    excluded: StationSet::EMPTY,
+                    accounted_for: StationSet::EMPTY,
+                    writes: Default::default(),
+                    pulses: Default::default(),
+                    inputs: Image::from_bits(inputs.iter().copied()),
+                    version: Some(noted_by),
+                },
+            };
+            let prepared = Some(if own == AFTER { ConfigurationHash(2) } else { AFTER });
+            let remote_io =
+                plant.bench.remote_io.changed(&change, Configurations { own, prepared });
+            plant.bench.remote_io = remote_io.noting(Some(note), false);
+            plant.show(if own == AFTER { &[false; 3] } else { &[false; 2] });
+            let seen = (0..60).map(|_| plant.cycle(None, Some(AFTER)));
+            let seen = seen.into_iter().find(|seen| !seen.inputs.is_empty()).expect("a sample");
+            assert_eq!(seen.inputs, expected, "{noted_by:?} {own:?}");
+        }
     }
 }
 

@@ -168,6 +168,7 @@ fn a_failed_channel_keeps_no_forced_value_over_a_restart() {
                     seconds: 60,
                     owner: "anna".to_owned(),
                     reason: "a test".to_owned(),
+                    points: None,
                 };
                 bench.tell(RemoteIoInput::Force(&force));
             }

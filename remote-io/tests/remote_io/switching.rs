@@ -54,6 +54,7 @@ fn change() -> Arc<OnlineChange> {
             forward: Arc::new(Same),
             back: Arc::new(Same),
             points: None,
+            known_by: [settings(1).layout.hash; 2],
         }],
         fallbacks: vec![FallbackChange { program: PROGRAM, before, after }],
     })

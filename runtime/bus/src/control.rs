@@ -12,7 +12,7 @@ use understudy_wire::{ChangeRequest, Force, Write};
 use crate::error::BusError;
 use crate::orders::{Control, Cuts, Order};
 
-/// Whether commands are read, one a line: `stop`, `release`, `force {...}`, `unforce {...}` and `write {...}` with a [`Force`], a [`SignalPlace`](understudy_wire::SignalPlace) and a [`Write`] as JSON.
+/// Whether commands are read, one a line: `stop`, `release`, `force {...}`, `unforce {...}` and `write {...}` with a [`Force`], an [`Unforce`](understudy_wire::Unforce) and a [`Write`] as JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Commands {
     /// None: standard input is left alone.
@@ -148,7 +148,7 @@ pub(crate) fn order(line: &str) -> Option<Order> {
             let write: Write = serde_json::from_str(write).ok()?;
             write.check().is_ok().then_some(Order::Write(write))
         }
-        ("unforce", signal) => serde_json::from_str(signal).ok().map(Order::Unforce),
+        ("unforce", unforce) => serde_json::from_str(unforce).ok().map(Order::Unforce),
         _ => None,
     }
 }
@@ -187,7 +187,7 @@ impl Lines {
 
 #[cfg(test)]
 mod tests {
-    use understudy_wire::{Cycle, SignalPlace, StateChoice};
+    use understudy_wire::{Cycle, PointsHash, SignalPlace, StateChoice, Unforce};
 
     use super::*;
 
@@ -214,6 +214,7 @@ mod tests {
             seconds: 60,
             owner: "anna".into(),
             reason: "to see the lamp".into(),
+            points: Some(PointsHash(u64::MAX)),
         };
         let line = serde_json::to_string(&force).expect("JSON");
         assert!("force ".len() + line.len() < LINE_BYTES);
@@ -222,8 +223,14 @@ mod tests {
         check("release now", None);
         check(&format!("force {line}"), Some(Order::Force(force)));
         check(&format!("force {}", line.replace("60", "0")), None);
-        check(r#"unforce {"input":0}"#, Some(Order::Unforce(SignalPlace::Input(0))));
-        check(r#"unforce {"input":70000}"#, None);
+        let (signal, points) = (SignalPlace::Input(0), Some(PointsHash(7)));
+        for (points, line) in [
+            (None, r#"unforce {"signal":{"input":0}}"#),
+            (points, r#"unforce {"signal":{"input":0},"points":7}"#),
+        ] {
+            check(line, Some(Order::Unforce(Unforce { signal, points })));
+        }
+        check(r#"unforce {"signal":{"input":70000}}"#, None);
         check("unforce", None);
         check(r#"choose "cold""#, Some(Order::Choose(StateChoice::Cold)));
         let cycle = Some(Cycle(7));

@@ -228,7 +228,7 @@ impl<M: Machine> Host<'_, M> {
                 Order::Release => Input::RemoteIo(RemoteIoInput::Release),
                 Order::Choose(choice) => Input::RemoteIo(RemoteIoInput::Choose(*choice)),
                 Order::Force(force) => Input::RemoteIo(RemoteIoInput::Force(force)),
-                Order::Unforce(signal) => Input::RemoteIo(RemoteIoInput::Unforce(*signal)),
+                Order::Unforce(unforce) => Input::RemoteIo(RemoteIoInput::Unforce(unforce)),
                 Order::Write(write) => Input::RemoteIo(RemoteIoInput::Write(write)),
                 Order::Change(order) => Input::Change(order),
             };

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::json;
 use understudy_wire::{
-    ChangeRequest, ClusterHash, ConfigurationHash, Force, Role, SignalPlace, StateChoice, Write,
+    ChangeRequest, ClusterHash, ConfigurationHash, Force, Role, StateChoice, Unforce, Write,
 };
 use zenoh::Wait;
 
@@ -46,7 +46,7 @@ pub enum Request {
     /// To put a value in the place of a signal of a remote I/O.
     Force(Force),
     /// To take it back.
-    Unforce(SignalPlace),
+    Unforce(Unforce),
     /// To write a value; the caller asks under its own role.
     Write(Write),
     /// To record an order that was refused before it was sent.
@@ -112,7 +112,7 @@ impl Request {
         let text = match self {
             Self::Choose(choice) => serde_json::to_string(choice),
             Self::Force(force) => serde_json::to_string(force),
-            Self::Unforce(signal) => serde_json::to_string(signal),
+            Self::Unforce(unforce) => serde_json::to_string(unforce),
             Self::Write(write) => serde_json::to_string(write),
             Self::Refused(order) => serde_json::to_string(&order.clone().bounded()),
             Self::Spare(report) => serde_json::to_string(report),

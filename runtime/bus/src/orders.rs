@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use understudy_cycle::ChangeOrder;
 use understudy_wire::{
-    Force, Member, OrderRefusal, ProgramSet, SignalPlace, StateChoice, StationSet, Via, Write,
+    Force, Member, OrderRefusal, ProgramSet, StateChoice, StationSet, Unforce, Via, Write,
     WriteAnswer,
 };
 
@@ -32,7 +32,7 @@ pub enum Order {
     /// The operator puts a value in the place of a signal.
     Force(Force),
     /// The operator takes it back.
-    Unforce(SignalPlace),
+    Unforce(Unforce),
     /// An operator writes a value.
     Write(Write),
     /// An engineer moves an online change on.

@@ -26,7 +26,7 @@ use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
 use understudy_testing::press_cell;
 use understudy_wire::{
-    ConfigurationHash, Configurations, Force, Role, SignalPlace, Write, WriteId,
+    ConfigurationHash, Configurations, Force, Role, SignalPlace, Unforce, Write, WriteId,
 };
 use zenoh::Wait;
 
@@ -173,10 +173,11 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         seconds: 0,
         owner: "anna".to_owned(),
         reason: "to see it".to_owned(),
+        points: None,
     });
     let refused = asked(member, "shift-leader", force);
     assert!(refused.as_ref().is_ok_and(|answer| answer != DONE), "no time: {refused:?}");
-    let unforce = Request::Unforce(SignalPlace::Output(0));
+    let unforce = Request::Unforce(Unforce { signal: SignalPlace::Output(0), points: None });
     let taken = asked(member, "shift-leader", unforce.clone());
     assert_eq!(taken.ok().as_deref(), Some(DONE));
     let status = asked(member, "line-operator", Request::Status);
@@ -199,6 +200,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         role: Role::Operator,
         owner: "anna".to_owned(),
         reason: "to see it".to_owned(),
+        points: None,
     });
     let lost = asked(member, "line-operator", write.clone());
     assert!(matches!(lost, Err(BusError::AnswerLost { .. })), "{lost:?}");

@@ -13,9 +13,11 @@ use understudy_cluster::{ChangeError, ChangeTexts, Cluster};
 use understudy_cycle::OnlineChange;
 use understudy_wire::{
     ChangeName, ConfigurationHash, Configurations, Member, OrderRefusal, ProgramHash, ProgramId,
+    RetainedProgram,
 };
 
 use crate::field::Wirings;
+use crate::retained::retained_inputs;
 use crate::run::MemberOptions;
 
 /// The longest text of a change that is read from a file.
@@ -37,6 +39,8 @@ struct KeptChanges {
 pub(crate) struct StartedChange {
     /// The cluster, with the programs of the changes that were accepted.
     pub(crate) cluster: Cluster,
+    /// The cluster in the configuration that is the member's own, as of the change that is going on: values of any other program are taken over to it.
+    pub(crate) own: Cluster,
     /// The change that is going on, and the configurations that the member had.
     pub(crate) restored: Option<(Arc<OnlineChange>, Configurations)>,
     pub(crate) changes: Changes,
@@ -80,9 +84,10 @@ pub(crate) fn started_change(
     let text = keeper.text(configurations.own);
     let change = restored.as_ref().map(|(change, _)| Arc::clone(change));
     let cluster = keeper.cluster.clone();
+    let own = keeper.cluster_in(configurations.own).unwrap_or_else(|| cluster.clone());
     let changes = Changes::new(configurations, change, text, Some(Box::new(keeper)));
     wirings.learn(&cluster);
-    StartedChange { cluster, restored, changes, found, programs, wirings }
+    StartedChange { cluster, own, restored, changes, found, programs, wirings }
 }
 
 impl StartedChange {
@@ -155,17 +160,37 @@ impl Keeper {
         Ok(restored)
     }
 
-    /// Records may be of the programs of the change that goes on, of one that was loaded, and of the cluster.
+    /// Records may be of the programs of the change that goes on, of one that was loaded, and of the cluster. Those of a remote I/O have the names of the
+    /// inputs that keep their values, too.
     fn tell_programs(&self) {
         let current = self.kept.current.as_ref().map(|(texts, _)| texts);
         let texts = current.into_iter().chain(&self.loaded);
-        self.programs.are(texts.flat_map(ChangeTexts::kept_programs).collect());
+        let programs = texts.flat_map(|texts| {
+            let sides = [texts.before, texts.after].map(|side| self.cluster.changed(texts, side));
+            let inputs = sides.into_iter().filter_map(|side| {
+                let (side, program) = (side.ok()?, self.wirings.program()?);
+                let hash = side.controllers().get(program.index())?.hash;
+                Some((hash, retained_inputs(&side, program)))
+            });
+            let inputs: Vec<_> = inputs.collect();
+            texts.kept_programs().map(move |kept| {
+                let found = inputs.iter().find(|(hash, _)| *hash == kept.hash);
+                let inputs = found.map_or_else(Vec::new, |(_, inputs)| inputs.clone());
+                RetainedProgram { inputs, ..kept }
+            })
+        });
+        self.programs.are(programs.collect());
+    }
+
+    /// The cluster in one of the configurations of the change that goes on; nothing where there is none.
+    fn cluster_in(&self, configuration: ConfigurationHash) -> Option<Cluster> {
+        let (texts, _) = self.kept.current.as_ref()?;
+        self.cluster.changed(texts, configuration).ok()
     }
 
     /// The canonical text of a configuration that is loaded.
     fn text(&self, own: ConfigurationHash) -> String {
-        let current = self.kept.current.as_ref();
-        let changed = current.and_then(|(texts, _)| self.cluster.changed(texts, own).ok());
+        let changed = self.cluster_in(own);
         changed.as_ref().unwrap_or(&self.cluster).canonical_text().to_owned()
     }
 

@@ -11,7 +11,7 @@ use understudy_wire::{Frame, Image, Member, Moment, ProgramHash, ProgramId};
 /// Where the points of the versions of one program are in its device, by the changes that its member has loaded. All clones are of one member.
 #[derive(Debug, Clone)]
 pub(crate) struct Wirings {
-    /// Nothing for a member without a device.
+    /// That of the remote I/O; nothing for a station or a plant.
     program: Option<ProgramId>,
     known: Arc<Mutex<Vec<Wiring>>>,
 }
@@ -25,6 +25,9 @@ struct Wiring {
     fail_safe: Image,
 }
 
+/// Why nothing is read or driven.
+const UNKNOWN_PLACES: &str = "U0650: the places of its inputs and outputs are not known";
+
 /// Wirings that are known, at most: each change has two.
 const MOST_WIRINGS: usize = 64;
 
@@ -32,6 +35,11 @@ impl Wirings {
     /// None are known yet. `member` is that of the process.
     pub(crate) fn new(member: Member) -> Self {
         Self { program: member.sampled_program(), known: Arc::default() }
+    }
+
+    /// The program of the remote I/O.
+    pub(crate) fn program(&self) -> Option<ProgramId> {
+        self.program
     }
 
     /// Whether a change of these points concerns the device.
@@ -140,7 +148,7 @@ impl FieldDriver for Equipment {
 
     fn look(&mut self) -> Option<Look> {
         self.device.look().map(|look| match look {
-            _ if self.is_unwired => Look::Lost("the places of its points are not known".into()),
+            _ if self.is_unwired => Look::Lost(UNKNOWN_PLACES.to_owned()),
             DeviceLook::Sensors(sensors) => Look::Sensors(sensors),
             DeviceLook::Lost(reason) => Look::Lost(reason),
         })
@@ -186,7 +194,7 @@ mod tests {
         let wirings = Wirings::new(Member::RemoteIo(ProgramId(0)));
         wirings.learn(&before);
         let mut equipment = equipment(&before, &wirings);
-        let lost = Some(Look::Lost("the places of its points are not known".to_owned()));
+        let lost = Some(Look::Lost(UNKNOWN_PLACES.to_owned()));
         let look = |equipment: &mut Equipment| {
             std::iter::repeat_with(|| equipment.look()).find(Option::is_some).flatten()
         };

@@ -7,7 +7,6 @@ use understudy_cluster::{Cluster, Code, Security, read_kept};
 use understudy_executable::Scratch;
 use understudy_keys::authority_of;
 use understudy_node::Settings;
-use understudy_remote_io::OperatorInput;
 use understudy_typed::{CarriedState, Fate};
 use understudy_wire::{
     Carried, Digest, Image, Moment, ProgramHash, ProgramId, RetainedProgram, RetainedRun,
@@ -17,8 +16,8 @@ use understudy_wire::{
 use crate::former;
 use crate::run::MemberOptions;
 
-/// What a station has kept of each program with retentive variables that it runs, and the files. `is_loaded` says whether it has loaded a program
-/// besides that of the cluster file, by an online change.
+/// What a station has kept of each program with retentive variables that it runs, and the files; values of other programs are taken over to those of
+/// `cluster`. `is_loaded` says whether it has loaded a program besides them, by an online change.
 pub(crate) fn retained_runs(
     cluster: &Cluster,
     options: &MemberOptions,
@@ -104,7 +103,15 @@ fn owner(cluster: &Cluster, options: &MemberOptions) -> Owner {
     Owner { cluster: cluster.agreement().cluster, authority: keys.and_then(authority_of) }
 }
 
-/// What a remote I/O has noted, with the inputs in the image of its program, and the files.
+/// The inputs of a program that operators write and that keep their values, by name.
+pub(crate) fn retained_inputs(cluster: &Cluster, program: ProgramId) -> Vec<String> {
+    let remote_io = cluster.remote_ios().get(program.index());
+    let sources = remote_io.into_iter().flat_map(|remote_io| &remote_io.inputs);
+    let retained = sources.filter(|source| source.operator().is_some_and(|it| it.input.retains));
+    retained.map(|source| source.name.clone()).collect()
+}
+
+/// What a remote I/O has noted, with the inputs in the image of its program in `cluster`, and the files.
 pub(crate) fn retained_notes(
     cluster: &Cluster,
     folder: &Path,
@@ -118,12 +125,7 @@ pub(crate) fn retained_notes(
     let hash = settings.hash;
     let inputs = code.interface().inputs;
     let input_at = |bit: u16| inputs.iter().find(|point| point.bit == u32::from(bit));
-    let retained_where = |is_wanted: &dyn Fn(&OperatorInput) -> bool| -> Vec<String> {
-        let wanted =
-            settings.layout.operator_inputs.iter().filter(|it| it.retains && is_wanted(it));
-        wanted.filter_map(|input| Some(input_at(input.place.bit)?.name.clone())).collect()
-    };
-    let retained = retained_where(&|_| true);
+    let retained = retained_inputs(cluster, program);
     let kept = RetainedProgram { inputs: retained.clone(), ..code.source().kept(hash) };
     let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name()));
     let files = files.with_program(kept).with_authority(owner.authority);
@@ -171,6 +173,7 @@ pub(crate) fn retained_notes(
                 carried.kept = names.len() - carried.dropped.len();
                 carried.new = retained.iter().filter(|name| !names.contains(name)).count();
                 note.recalled.inputs = image;
+                note.recalled.version = Some(hash);
             }
             Err(problem) => {
                 // Nothing tells what its bits are.
@@ -182,8 +185,13 @@ pub(crate) fn retained_notes(
     }
     let noted = notes.newest.as_ref().map(|note| &note.recalled.inputs);
     if let Some(noted) = noted.filter(|noted| noted.width() == settings.layout.input_width()) {
-        let outside = retained_where(&|input| !input.admits(input.place.get(noted)));
-        carried.dropped.extend(outside);
+        let outside = settings
+            .layout
+            .operator_inputs
+            .iter()
+            .filter(|input| input.retains && !input.admits(input.place.get(noted)));
+        let outside = outside.filter_map(|input| input_at(input.place.bit));
+        carried.dropped.extend(outside.map(|point| point.name.clone()));
     }
     let is_told = carried.kept + carried.new + carried.dropped.len() > 0;
     let carried = is_told.then_some(carried).into_iter().collect();

@@ -68,7 +68,8 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
     let settings = cluster.station_settings(station, FirstNumbers::now()?.founds);
     let settings = settings.ok_or_else(wrong)?;
     let is_loaded = |program, hash| started.has_loaded(program, hash);
-    let (runs, retention) = retained_runs(cluster, options, &settings, is_loaded);
+    let own = started.own.station_settings(station, settings.founds).ok_or_else(wrong)?;
+    let (runs, retention) = retained_runs(&started.own, options, &own, is_loaded);
     let settings = later_than_retained(settings, &runs);
     let mut machine = Station::new(Time::default(), settings);
     if let Some((change, configurations)) = &started.restored {
@@ -87,12 +88,12 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     let member = find_member(cluster, &options.name)?;
     let started = started_change(cluster, member, options);
     let cluster = &started.cluster.clone();
-    let settings = match member {
+    let settings_in = |cluster: &Cluster| match member {
         Member::RemoteIo(program) => cluster.remote_io_settings(program),
         Member::Twin(program) => cluster.twin_settings(program),
         Member::Station(_) | Member::Plant(_) => None,
     };
-    let settings = settings.ok_or_else(wrong)?;
+    let settings = settings_in(cluster).ok_or_else(wrong)?;
     let field = field_of(options, cluster, member, (&settings, &started.wirings))?;
     let is_retentive = settings.fallback.restart.is_some();
     let mut machine = RemoteIo::new(Time::default(), settings.clone());
@@ -103,8 +104,9 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
         let retention = Retention { is_missing: is_retentive, ..Retention::default() };
         return run(cluster, options, member, machine, field, (retention, started));
     };
+    let own = settings_in(&started.own).ok_or_else(wrong)?;
     let (notes, retention) =
-        retained_notes(cluster, folder, options, &settings, |program, hash| {
+        retained_notes(&started.own, folder, options, &own, |program, hash| {
             started.has_loaded(program, hash)
         });
     let machine = machine.noting(notes.newest, notes.is_damaged);

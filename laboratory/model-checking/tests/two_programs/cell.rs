@@ -101,6 +101,7 @@ fn change(before: &Program, configuration: ConfigurationHash) -> OnlineChange {
         forward: Arc::new(MoreRegisters(true)),
         back: Arc::new(MoreRegisters(false)),
         points: None,
+        known_by: [Layout::booleans(1, 1).hash; 2],
     };
     let after = Fallback { hold_cycles: 2, fail_safe: Image::from_bits([true]), ..fallback() };
     let fallback = FallbackChange { program: ProgramId(0), before: fallback(), after };

@@ -256,6 +256,7 @@ fn a_sample_without_a_record_may_have_what_was_written() {
         role: Role::Operator,
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),
+        points: None,
     };
     let written = Event::Written { moment: moment(1), write };
     // The remote I/O was killed after the sample of cycle 2, in which the value was; a pulse is over in the next one.
@@ -470,6 +471,7 @@ fn a_program_is_judged_during_later_changes_of_others() {
         forward: way.clone(),
         back: way,
         points: None,
+        known_by: Default::default(),
     };
     referee.learn(&change(1, vec![program]));
     let mut lineage = Lineage::genesis(ProgramHash(5), moment(0));

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use understudy_cycle::{Agreement, ChangeOrder, Input, Machine, Program, RemoteIoInput};
 use understudy_wire::{
-    ConfigurationHash, Epoch, Frame, Member, Moment, ProgramHash, ProgramId, SignalPlace, StationId,
+    ConfigurationHash, Epoch, Frame, Member, Moment, PointsHash, ProgramHash, ProgramId,
+    SignalPlace, StationId, Unforce,
 };
 
 use super::pairs::twin_of;
@@ -60,14 +61,15 @@ impl Simulation {
                 self.give(member, Input::RemoteIo(RemoteIoInput::Choose(choice)), observe);
             }
             (Member::RemoteIo(_) | Member::Twin(_), Action::Set { .. }) => {
-                if let Some(force) = action.force() {
+                if let Some(force) = action.force(self.points_read(member)) {
                     let force = RemoteIoInput::Force(&force);
                     self.give(member, Input::RemoteIo(force), observe);
                 }
             }
             (Member::RemoteIo(_) | Member::Twin(_), Action::Unset { input }) => {
-                let unforce = RemoteIoInput::Unforce(SignalPlace::Input(input));
-                self.give(member, Input::RemoteIo(unforce), observe);
+                let (signal, points) = (SignalPlace::Input(input), self.points_read(member));
+                let unforce = Unforce { signal, points };
+                self.give(member, Input::RemoteIo(RemoteIoInput::Unforce(&unforce)), observe);
             }
             (Member::RemoteIo(_) | Member::Twin(_), Action::StickInput { input, value }) => {
                 self.stick_input(member, input, Some(value));
@@ -76,7 +78,7 @@ impl Simulation {
                 self.stick_input(member, input, None);
             }
             (Member::RemoteIo(_) | Member::Twin(_), Action::Write { .. }) => {
-                if let Some(write) = fault.write() {
+                if let Some(write) = fault.write(self.points_read(member)) {
                     self.give(member, Input::RemoteIo(RemoteIoInput::Write(&write)), observe);
                 }
             }
@@ -100,6 +102,12 @@ impl Simulation {
                 self.catch_up(member, waiting, observe);
             }
         }
+    }
+
+    /// The points that a person reads in the newest sample before he gives an order to a remote I/O.
+    fn points_read(&self, member: Member) -> Option<PointsHash> {
+        let referee = self.referees.get(member.sampled_program()?.index())?;
+        Some(referee.layout().hash)
     }
 
     /// An engineer takes a step of the online change at one member.

@@ -150,6 +150,7 @@ pub fn new_write(
         role: request.role,
         owner: request.owner.to_owned(),
         reason: request.reason.to_owned(),
+        points: member.sampled_program().and_then(|program| cluster.points_hash(program)),
     };
     write.check()?;
     Ok(write)

@@ -4,7 +4,8 @@ use understudy_bus::HostEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::Action;
 use understudy_wire::{
-    ChangeRequest, Member, OrderRefusal, StateChoice, WriteAnswer, WriteOutcome, WriteRefusal,
+    ChangeRequest, Member, OrderRefusal, StateChoice, Unforce, WriteAnswer, WriteOutcome,
+    WriteRefusal,
 };
 
 use super::{Command, Commanded, Done, OperatorAction, Refusal};
@@ -168,13 +169,12 @@ fn outcome(
         {
             refused(*refusal)
         }
-        (Command::Unforce { signal }, RemoteIoEvent::Unforced { signal: done, .. })
-            if signal == done =>
-        {
-            Some(Ok(Done::default()))
-        }
         (
-            Command::Unforce { signal },
+            Command::Unforce(Unforce { signal, .. }),
+            RemoteIoEvent::Unforced { signal: done, .. },
+        ) if signal == done => Some(Ok(Done::default())),
+        (
+            Command::Unforce(Unforce { signal, .. }),
             RemoteIoEvent::UnforceRefused { signal: other, refusal, .. },
         ) if signal == other => refused(*refusal),
         (Command::Choose { choice: StateChoice::Cold }, RemoteIoEvent::StartedCold { .. })
@@ -239,7 +239,7 @@ mod tests {
         let moment = Moment::default();
         let signal = SignalPlace::Input(0);
         let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
-        let force = Force { signal, value: true.into(), seconds: 1, owner, reason };
+        let force = Force { signal, value: true.into(), seconds: 1, owner, reason, points: None };
         let choose = |choice| Command::Choose { choice };
         let refusal = OrderRefusal::NotForced;
         let orders = [
@@ -254,7 +254,7 @@ mod tests {
                 RemoteIoEvent::ForceRefused { moment, force, refusal },
             ),
             (
-                Command::Unforce { signal },
+                Command::Unforce(Unforce { signal, points: None }),
                 RemoteIoEvent::Unforced { moment, signal, expired: false },
                 RemoteIoEvent::UnforceRefused { moment, signal, refusal },
             ),
@@ -268,8 +268,10 @@ mod tests {
             ] {
                 let mut orders = PendingOrders::default();
                 let (first, _waits) = commanded(command.clone(), is_gone);
-                let (other, _other) =
-                    commanded(Command::Unforce { signal: SignalPlace::Output(9) }, false);
+                let (other, _other) = commanded(
+                    Command::Unforce(Unforce { signal: SignalPlace::Output(9), points: None }),
+                    false,
+                );
                 orders.add(first, NAME.to_owned());
                 orders.add(other, NAME.to_owned());
                 let decided = orders.observe(&record(event));
@@ -295,7 +297,7 @@ mod tests {
             ]
         };
         let signal = SignalPlace::Input(0);
-        let unforce = || Command::Unforce { signal };
+        let unforce = || Command::Unforce(Unforce { signal, points: None });
         let moment = Moment::default();
         for end in ends(MEMBER) {
             let mut orders = PendingOrders::default();

@@ -208,6 +208,7 @@ mod tests {
             role: Role::Operator,
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
+            points: None,
         }
     }
 

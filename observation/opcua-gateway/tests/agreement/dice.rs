@@ -253,6 +253,7 @@ impl Dice<'_> {
                     seconds: 9,
                     owner: "anna".to_owned(),
                     reason: "a test".to_owned(),
+                    points: None,
                 },
             },
             3 => RemoteIoEvent::Unforced { moment, signal, expired: false },

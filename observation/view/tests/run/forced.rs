@@ -16,7 +16,14 @@ const FAR: SignalPlace = SignalPlace::Output(0);
 
 fn force(signal: SignalPlace, value: bool, owner: &str) -> Force {
     let owner = owner.to_owned();
-    Force { signal, value: value.into(), seconds: 60, owner, reason: "a test".to_owned() }
+    Force {
+        signal,
+        value: value.into(),
+        seconds: 60,
+        owner,
+        reason: "a test".to_owned(),
+        points: None,
+    }
 }
 
 /// A run in which `far` is forced from its hundredth deadline on, for a hundred deadlines; the cycles of both.

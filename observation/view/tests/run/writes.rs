@@ -26,6 +26,7 @@ fn refused() -> Record {
         role: Role::Operator,
         owner: "anna".to_owned(),
         reason: "faster".to_owned(),
+        points: None,
     };
     Record {
         at_ns: u64::MAX,

@@ -14,8 +14,8 @@ use understudy_journal::{
 };
 use understudy_typed::Point;
 use understudy_wire::{
-    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, Member, PointValue, Role, SignalPlace,
-    StateChoice,
+    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, Member, PointValue, PointsHash, Role,
+    SignalPlace, StateChoice, Unforce,
 };
 
 use super::Answered;
@@ -210,7 +210,9 @@ impl AskedCommand {
             Self::Choose { choice } => Command::Choose { choice },
             Self::Isolate => Command::Isolate,
             Self::Rejoin => Command::Rejoin,
-            Self::Unforce { signal } => Command::Unforce { signal },
+            Self::Unforce { signal } => {
+                Command::Unforce(Unforce { signal, points: points(cluster, member) })
+            }
             Self::Write { input, value } => {
                 let request = WriteRequest {
                     input: &input,
@@ -233,9 +235,15 @@ impl AskedCommand {
                 seconds,
                 owner,
                 reason,
+                points: points(cluster, member),
             }),
         })
     }
+}
+
+/// Identifies the points by which the page shows the signals of a remote I/O.
+fn points(cluster: &Cluster, member: Member) -> Option<PointsHash> {
+    cluster.points_hash(member.sampled_program()?)
 }
 
 /// The person who is logged in, or whose keys the page uses; otherwise the name in the request.

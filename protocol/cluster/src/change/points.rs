@@ -14,6 +14,7 @@ use understudy_wire::ProgramId;
 
 use super::unfit::different_point;
 use super::{Between, ChangeError, ChangeTexts, Difference, NeedsStop, differences};
+use crate::canonical::points_hash;
 use crate::cluster::{Cluster, Controller};
 use crate::configuration::{FALLBACK, INPUT, input_line};
 use crate::read::{Overrides, read_with};
@@ -194,6 +195,7 @@ fn program_change(
         forward: Arc::new(Between::new(&old.code, &new.code)),
         back: Arc::new(Between::new(&new.code, &old.code)),
         points: points.map(Arc::new),
+        known_by: [old, new].map(|it| points_hash(&it.interface)),
     }
 }
 

@@ -56,6 +56,8 @@ fn check_texts(before: &Cluster, after: &Cluster) {
         assert_eq!(change.fallbacks, expected.fallbacks);
         for (found, expected) in change.programs.iter().zip(&expected.programs) {
             assert_eq!(found.points, expected.points);
+            let known = [before, after].map(|it| it.points_hash(found.program));
+            assert_eq!(found.known_by.map(Some), known);
             let hashes = [found, expected].map(|it| (it.before.hash, it.after.hash));
             assert_eq!(hashes[0], hashes[1]);
         }
@@ -154,6 +156,29 @@ fn points_of_another_body_stay() {
     let change = change.expect("an online change");
     assert!(change.of(ProgramId(0)).expect("it changes").points.is_none());
     assert_eq!(change.fallbacks, []);
+    check_texts(&cluster(LEFT, "", ""), &cluster(&body, "", ""));
+}
+
+/// Who names a point says by which file: another name, place, type or name of a value is another file, and nothing else is.
+#[test]
+fn points_are_known_by_names_places_and_types() {
+    let known = |text: &str| cluster(text, "", "").points_hash(ProgramId(0)).expect("a program");
+    let modes = format!("TYPE Mode : (Off, Auto); END_TYPE {LEFT}")
+        .replace("level : INT;", "level : Mode;");
+    let modes = modes.replace("shown : INT;", "shown : Mode;");
+    let base = [known(LEFT), known(&modes)];
+    assert_eq!(known(&LEFT.replace("done := go;", "done := NOT go;")), base[0]);
+    for (text, base) in [
+        (LEFT.replace("level", "other"), base[0]),
+        (LEFT.replace("go : BOOL; level : INT;", "level : INT; go : BOOL;"), base[0]),
+        (LEFT.replace("INT", "UINT"), base[0]),
+        (LEFT.replace("level : INT;", "level : INT (0..9);"), base[0]),
+        (LEFT.replace("done : BOOL;", "done : BOOL; more : BOOL;"), base[0]),
+        (modes.replace("Off, Auto", "Auto, Off"), base[1]),
+        (modes.replace("Off, Auto", "Off, Auto, Man"), base[1]),
+    ] {
+        assert_ne!(known(&text), base, "{text}");
+    }
 }
 
 #[test]

@@ -193,6 +193,7 @@ mod tests {
             role: Role::Operator,
             owner: owner.to_owned(),
             reason: "a test".to_owned(),
+            points: None,
         };
         Session::taken(&write, 0)
     }
