@@ -18,6 +18,7 @@ mod handshake;
 
 mod hosts;
 mod last_numbers;
+mod points;
 mod power;
 mod program_change;
 mod set_inputs;

@@ -8,7 +8,7 @@ mod name;
 
 use std::fmt;
 
-pub use block::{Block, BlockKind, Feed};
+pub use block::{Block, BlockKind, Cost, Feed};
 pub use name::Name;
 use understudy_text::words;
 pub use understudy_typed::Comparison as Relation;
