@@ -41,11 +41,11 @@ const APART: f64 = 50.0;
 const STEP: f64 = 0.001;
 
 /// A laboratory, ended with the test.
-struct Laboratory(Child);
+pub(super) struct Laboratory(pub(super) Child);
 
 impl Laboratory {
     /// Ends it in order.
-    fn end(mut self, runs: &Path) {
+    pub(super) fn end(mut self, runs: &Path) {
         signal(self.0.id(), Signal::SIGINT);
         self.0.wait().expect("it ends");
         no_orphan(runs);

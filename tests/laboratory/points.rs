@@ -7,13 +7,12 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use nix::sys::signal::Signal;
 use serde_json::Value;
 use understudy_testing::points::{DECLARED, POINTS, Row, cluster_file, statements};
 
-use super::gates::{Gateway, python};
+use super::gates::{Gateway, Laboratory, python};
 use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time};
-use super::{PERIOD, no_orphan, running_with, signal};
+use super::{PERIOD, running_with};
 
 /// The order was taken by the remote I/O.
 fn operate(run: &str, what: &str, text: &str, more: &[&str]) -> Value {
@@ -57,7 +56,8 @@ fn forces_and_live_writes_are_of_the_declared_type() {
     let runs = out.join("runs");
     let arguments = ["lab", cluster.to_str().expect("text"), "--period", PERIOD, "--out"];
     let more = ["--cycles", "1000000", "--allow-commands"];
-    let (mut child, errors) = running_with(&arguments, &runs, &more, "synchronised: ");
+    let (child, errors) = running_with(&arguments, &runs, &more, "synchronised: ");
+    let laboratory = Laboratory(child);
     // It says more, and must not wait for a reader.
     std::thread::spawn(move || std::io::copy(&mut { errors }, &mut std::io::sink()));
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
@@ -91,9 +91,7 @@ fn forces_and_live_writes_are_of_the_declared_type() {
     }
     wait_for(run, &Row::told, &Row::told);
     by_python(run);
-    signal(child.id(), Signal::SIGINT);
-    child.wait().expect("it ends");
-    no_orphan(&runs);
+    laboratory.end(&runs);
     in_the_journal(run);
 }
 
