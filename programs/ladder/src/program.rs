@@ -236,6 +236,21 @@ impl Program {
     }
 }
 
+impl Rung {
+    /// What its contacts and comparisons read, in the order of the scan, and what it writes: its blocks, then the targets of its coils.
+    pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
+        let (mut read, mut written) = (Vec::new(), Vec::new());
+        visit(&self.network, &mut |element| match element {
+            Element::Contact(contact) => read.push(contact.operand.as_str()),
+            Element::Comparison(comparison) => read.push(comparison.counter.as_str()),
+            Element::Block(block) => written.push(block.name.as_str()),
+            Element::Branches(_) => {}
+        });
+        written.extend(self.coils.iter().map(|coil| coil.target.as_str()));
+        (read, written)
+    }
+}
+
 /// Calls `see` with every element in the order of the scan: what feeds a block comes before the block.
 pub fn visit<'a>(series: &'a Series, see: &mut impl FnMut(&'a Element)) {
     for element in series {
