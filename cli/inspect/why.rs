@@ -5,7 +5,7 @@ use clap::Args;
 use crate::answer::Answer;
 use crate::inspect::view::{RunArgument, ZoneArgument};
 
-/// Explain the value of an output in a cycle of a run
+/// Explain the value of an output or a variable in a cycle of a run
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -17,7 +17,7 @@ The program is evaluated again with the samples of the journal. The explanation 
 rungs and cycles that set the memory bits they read. For a reconstructed output it names the parity word, its members and the lineage
 that proves it.")]
 pub(crate) struct Arguments {
-    /// Output or memory bit by name or address, prefixed with its controller if the name is ambiguous
+    /// Output, variable or part of one by name or address, prefixed with its controller if the name is ambiguous
     #[arg(value_name = "OUTPUT")]
     output: String,
     /// Cycle, counted from the origin of the run; default: the newest

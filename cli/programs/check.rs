@@ -6,15 +6,17 @@ mod retained;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
 use serde::Serialize;
-use understudy_cluster::{Cluster, Overrides};
+use understudy_cluster::{Cluster, Code, Overrides, SourceText};
 use understudy_interchange::{
-    Format, Source, SourceFile, USUAL_PERIOD, Wanted, is_part, read_source, unknown_form,
+    Format, Source, USUAL_PERIOD, Wanted, is_part, read_source, unknown_form,
 };
 use understudy_journal::Members;
+use understudy_ladder::Program as Ladder;
 use understudy_scenarios::read;
 use understudy_supervisor::ladder::read_map;
 use understudy_supervisor::petri::read_net;
@@ -238,26 +240,40 @@ impl Found<'_> {
         program: Option<&str>,
         looking: &Looking,
     ) -> (Option<Source>, Option<Duration>, Vec<Diagnostic>) {
-        let SourceFile { source, rungs, period, mut diagnostics } =
-            read_source(name, text, Wanted { program, period: None });
-        let is_ladder = rungs.as_ref().is_some_and(|rungs| rungs.are_written);
-        let every = period.unwrap_or(USUAL_PERIOD);
-        let shown = shown.to_owned();
-        let ladder = rungs.as_ref().filter(|_| source.is_some()).map(|rungs| &rungs.ladder);
-        if ladder.is_some_and(|ladder| looking.at_rungs(ladder, every, &mut diagnostics)) {
-            self.cut_short.push(shown.clone());
-        }
-        if let Some(Source::Program(program)) = &source {
-            let retained = Retained::of(program, ladder.filter(|_| is_ladder));
-            self.retained.extend(retained.map(|retained| (shown.clone(), retained)));
-        }
-        match &source {
-            Some(Source::Program(_)) if is_ladder => {}
-            Some(Source::Program(program)) => self.sizes.push((shown, Size::of(program))),
-            Some(Source::Library(units)) => self.libraries.push((shown, units.clone())),
+        let file = read_source(name, text, Wanted { program, period: None });
+        let every = file.period.unwrap_or(USUAL_PERIOD);
+        match &file.source {
+            Some(Source::Program(typed)) => {
+                let executable = || {
+                    let source = Arc::new(SourceText::of(name, text, every));
+                    let code = Code::of(Arc::clone(typed), file.ladder().cloned(), source);
+                    code.ok().map(|code| code.executable())
+                };
+                self.list(shown, typed, Retained::of(typed, executable), file.ladder());
+            }
+            Some(Source::Library(units)) => self.libraries.push((shown.to_owned(), units.clone())),
             None => {}
         }
-        (source, period, diagnostics)
+        let mut diagnostics = file.diagnostics;
+        let rungs = file.rungs.filter(|_| file.source.is_some());
+        if rungs.is_some_and(|rungs| looking.at_rungs(&rungs.ladder, every, &mut diagnostics)) {
+            self.cut_short.push(shown.to_owned());
+        }
+        (file.source, file.period, diagnostics)
+    }
+
+    /// Lists what a program keeps, and the memory and the time that its statements take.
+    fn list(
+        &mut self,
+        shown: &str,
+        program: &Program,
+        retained: Option<Retained>,
+        written: Option<&Ladder>,
+    ) {
+        self.retained.extend(retained.map(|retained| (shown.to_owned(), retained)));
+        if written.is_none() {
+            self.sizes.push((shown.to_owned(), Size::of(program)));
+        }
     }
 
     /// Reports on the files of a TwinCAT project, which are one program.
@@ -299,12 +315,10 @@ impl Found<'_> {
             };
             let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
             seen.push(report.name.clone());
-            let retained = Retained::of(controller.code.typed(), controller.ladder())
+            let typed = controller.code.typed();
+            let retained = Retained::of(typed, || Some(controller.code.executable()))
                 .map(|retained| retained.writing(cluster.retained_bytes_a_day(program)));
-            self.retained.extend(retained.map(|retained| (report.name.clone(), retained)));
-            if controller.ladder().is_none() {
-                self.sizes.push((report.name.clone(), Size::of(controller.code.typed())));
-            }
+            self.list(&report.name, typed, retained, controller.ladder());
             if !known
                 && let Some(ladder) = controller.ladder()
                 && looking.at_rungs(ladder, period, &mut report.diagnostics)

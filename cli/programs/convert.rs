@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_interchange::plcopen::{Fidelity, fidelity_with_numbers};
 use understudy_interchange::{
-    Bodies, Compared, Format, Reading, Source, Wanted, WriteError, Written, read, read_source,
-    typed_text, unknown_form, write,
+    Bodies, Compared, Format, Reading, Wanted, WriteError, Written, read, read_source, typed_text,
+    unknown_form, write,
 };
 use understudy_text::duration::parse_positive;
 use understudy_text::{Lines, MAXIMUM_SHOWN, Report, has_errors, shortened};
@@ -96,39 +96,34 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let failed = |error: WriteError| (code(&error), error.to_string());
     let as_it_is = Wanted { period: None, ..wanted };
     let as_it_is = read_source(&report.name, &report.text, as_it_is);
-    let is_program = matches!(as_it_is.source, Some(Source::Program(_)));
-    let is_typed = is_program && as_it_is.ladder().is_none();
-    let written = match (&reading.program, form) {
-        // Statements are written as they are in each form that has statements.
-        (program, Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd)))
-            if program.is_none() || is_typed =>
-        {
+    // Statements are written as they are in each form that has statements.
+    let of_statements = match form {
+        Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd)) => {
             let bodies = match form {
                 Form::PlcopenFbd => Bodies::Blocks,
                 _ => Bodies::AsRead,
             };
-            match typed_text(&report.name, &report.text, wanted, form.format(), bodies) {
-                Ok((None, _)) => None,
-                Ok((Some(written), diagnostics)) => {
-                    report.diagnostics = diagnostics;
-                    // That of the ladder is of another reading.
-                    fidelity = fidelity_with_numbers(&report.text, wanted.program);
-                    Some(Ok(written))
-                }
-                Err(error) => {
-                    if is_typed {
-                        report.diagnostics.clone_from(&as_it_is.diagnostics);
-                    }
-                    Some(Err(failed(error)))
-                }
-            }
+            typed_text(&report.name, &report.text, wanted, form.format(), bodies)
         }
-        (Some(program), form) => {
+        _ => Ok((None, Vec::new())),
+    };
+    let written = match (of_statements, &reading.program) {
+        (Ok((Some(written), diagnostics)), _) => {
+            report.diagnostics = diagnostics;
+            // That of the ladder is of another reading.
+            fidelity = fidelity_with_numbers(&report.text, wanted.program);
+            Some(Ok(written))
+        }
+        (Err(error), _) => {
+            report.diagnostics.clone_from(&as_it_is.diagnostics);
+            Some(Err(failed(error)))
+        }
+        (Ok((None, found)), Some(program)) if !has_errors(&found) => {
             let period = arguments.period.or(reading.period);
             let written = |form: Form| write(form.format(), program, period).map_err(failed);
             Some(form.and_then(written))
         }
-        (None, _) => None,
+        (Ok((None, _)), _) => None,
     };
     let mut kept =
         if arguments.fidelity { fidelity_text(&fidelity, &report) } else { String::new() };

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use understudy_testing::points::{DECLARED, POINTS, Row, cluster_file, statements, writes};
+use understudy_testing::points::{DECLARED, MODE, POINTS, Row, cluster_file, statements, writes};
 
 use crate::{empty_folder, understudy_in};
 
@@ -152,7 +152,23 @@ fn drafted(folder: &Path, program: &str) {
         assert!(plant.contains(line), "{program} {line}: {plant}");
     }
     run(folder, &["check", "draft/cluster.toml"]);
-    run(folder, &["simulate", "draft/cluster.toml", "--cycles", "30", "--seed", "1"]);
+    let simulated = ["simulate", "draft/cluster.toml", "--cycles", "30", "--seed", "1", "--out"];
+    run(folder, &[&simulated[..], &["drafted"]].concat());
+    // A plant has the sensors as the program declares them.
+    let only = ["--all", "--event", "stepped", "--from", "20", "--to", "20"];
+    let stepped = run(folder, &[&["journal", "drafted/latest"][..], &only].concat());
+    let (_, sensors) = stepped.split_once("sensors ").expect("the sensors");
+    let sensors: Vec<&str> = sensors.split(", ").take(POINTS.len()).collect();
+    for (row, shown) in POINTS.iter().zip(sensors) {
+        let (name, value) = shown.split_once(" = ").expect("a value");
+        let is_right = match row.of {
+            "TIME" | "LTIME" => value.ends_with('s'),
+            "DATE" => value.matches('-').count() == 2,
+            "Mode" => MODE.iter().any(|(name, _)| *name == value),
+            _ => value.parse::<i64>().is_ok(),
+        };
+        assert!(name == row.name && is_right, "{program} {}: {stepped}", row.name);
+    }
 }
 
 /// A run shows every value as its cluster file has it.
@@ -179,7 +195,11 @@ fn of_a_run(folder: &Path, program: &str) {
     let sampled = joined(&|row| format!("{} = {}", row.name, row.shown), ", ");
     let driven = joined(&|row| format!("q{} = {}", row.name, row.shown), ", ");
     let journal = run(folder, &["journal", "runs/latest", "--all", "--from", "20", "--to", "20"]);
-    for line in [format!("samples {sampled}"), format!("drives {driven}, direct")] {
+    for line in [
+        format!("samples {sampled}"),
+        format!("publishes one {driven}\n"),
+        format!("drives {driven}, direct"),
+    ] {
         assert!(journal.contains(&line), "{program} {line}: {journal}");
     }
     for Row { name, of, shown, .. } in &POINTS {

@@ -41,11 +41,11 @@ const APART: f64 = 50.0;
 const STEP: f64 = 0.001;
 
 /// A laboratory, ended with the test.
-struct Laboratory(Child);
+pub(super) struct Laboratory(pub(super) Child);
 
 impl Laboratory {
     /// Ends it in order.
-    fn end(mut self, runs: &Path) {
+    pub(super) fn end(mut self, runs: &Path) {
         signal(self.0.id(), Signal::SIGINT);
         self.0.wait().expect("it ends");
         no_orphan(runs);
@@ -71,9 +71,9 @@ fn laboratory(out: &Path, more: &[&str]) -> (Laboratory, PathBuf) {
 }
 
 /// A gateway that serves; it is ended with the test.
-struct Gateway {
+pub(super) struct Gateway {
     child: Child,
-    address: String,
+    pub(super) address: String,
 }
 
 impl Gateway {
@@ -96,7 +96,7 @@ impl Gateway {
         Self { child, address }
     }
 
-    fn of(what: &str, run: &Path) -> Self {
+    pub(super) fn of(what: &str, run: &Path) -> Self {
         // Zenoh does not say which port it has found.
         let address = free_addresses(1).expect("a free port")[0].to_string();
         let mut command = understudy(&["gateway", what, "--allow-writes", "--listen", &address]);
@@ -131,7 +131,7 @@ impl Drop for Gateway {
 }
 
 /// A Python with a module; says so where there is none.
-fn python(module: &str) -> Option<String> {
+pub(super) fn python(module: &str) -> Option<String> {
     let python = std::env::var("UNDERSTUDY_PYTHON").unwrap_or_else(|_| "python3".into());
     let found = Command::new(&python)
         .args(["-c", &format!("import {module}")])

@@ -9,6 +9,7 @@
 mod alarms;
 mod boiler;
 mod campaigns;
+mod changed_points;
 mod changes;
 mod deaths;
 mod drafts;

@@ -1,374 +1,156 @@
-//! Online changes of inputs and outputs on real processes, with a device whose registers tell what was driven, and while a station is killed.
+//! A point is what its author declared while a cell runs: forces and writes from a terminal, and the Python client of the Zenoh gateway. The table of
+//! finished runs is in `tests/commands/points.rs`.
 
-use std::collections::BTreeMap;
 use std::fs;
-use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
-use std::process::Child;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use nix::sys::signal::Signal;
 use serde_json::Value;
-use understudy_cluster::{ChangeTexts, Cluster, read};
-use understudy_journal::{Command, Commander, OperatorAction};
-use understudy_wire::{ChangeRequest, Member, ProgramHash, ProgramId, StationId};
+use understudy_testing::points::{DECLARED, POINTS, Row, cluster_file, statements};
 
-use super::deaths::{Records, is};
-use super::shared::{DEADLINE, answer, empty_folder, modbus, some_at_a_time};
-use super::{no_orphan, running_with, signal};
+use super::gates::{Gateway, Laboratory, python};
+use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time};
+use super::{PERIOD, running_with};
 
-const CLUSTER: &str = r#"
-[cluster]
-name = "points"
-period = "100ms"
-security = "off"
-
-[[controller]]
-name = "drive"
-ladder = "drive.st"
-
-[[remote_io]]
-controller = "drive"
-hold_cycles = 3
-"#;
-
-/// Counts its scans, and shows two of its inputs.
-const BEFORE: &str = "
-PROGRAM drive
-  VAR_INPUT speed : INT; old : INT; END_VAR
-  VAR_OUTPUT shown : INT; gone : INT; echo : INT; END_VAR
-  VAR count : INT; END_VAR
-  count := count + 1;
-  shown := count;
-  gone := old;
-  echo := speed;
-END_PROGRAM";
-
-/// `speed` and `echo` have other places, `shown` another type, `old` and `gone` go, and `more`, `level`, `extra` and `sum` are new.
-const AFTER: &str = "
-PROGRAM drive
-  VAR_INPUT more : INT; level : REAL; speed : INT; END_VAR
-  VAR_OUTPUT extra : INT; echo : INT; sum : INT; shown : DINT; END_VAR
-  VAR count : INT; END_VAR
-  count := count + 1;
-  extra := count;
-  shown := count;
-  echo := speed;
-  sum := more + REAL_TO_INT(level);
-END_PROGRAM";
-
-const FAIL_SAFE_BEFORE: &str = "fail_safe = { shown = 71, gone = 72, echo = 73 }";
-const FAIL_SAFE_AFTER: &str = "fail_safe = { extra = 81, echo = 82, sum = 83, shown = 84 }";
-
-const PLACES_BEFORE: &str = r#"
-inputs = { speed = "input:0 int", old = "input:1 int" }
-outputs = { shown = "holding:0 int", gone = "holding:1 int", echo = "holding:2 int" }
-"#;
-const PLACES_AFTER: &str = r#"
-inputs = { more = "input:3 int", level = "input:4 real", speed = "input:6 int" }
-outputs = { extra = "holding:10 int", echo = "holding:11 int", sum = "holding:12 int", shown = "holding:14 dint" }
-"#;
-
-/// Input registers of the device: `speed` and `old`, then `more`, `level` (2.0), and another sensor of `speed`.
-const SENSORS: [u16; 7] = [11, 22, 0, 44, 0x4000, 0, 12];
-
-const OLD_PLACES: RangeInclusive<u16> = 0..=2;
-const NEW_PLACES: RangeInclusive<u16> = 10..=15;
-
-const DRIVE_IO: Member = Member::RemoteIo(ProgramId(0));
-
-/// What was written to the holding registers of the device: address and word, in their order.
-type Written = Arc<Mutex<Vec<(u16, u16)>>>;
-
-/// A device on a free port.
-fn device() -> (u16, Written) {
-    let written = Written::default();
-    let log = Arc::clone(&written);
-    let holding: Mutex<BTreeMap<u16, u16>> = Mutex::default();
-    let port = modbus::serve(move |request| {
-        let word = |at: usize| u16::from_be_bytes([request[at], request[at + 1]]);
-        let mut holding = holding.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut write = |address: u16, word: u16| {
-            holding.insert(address, word);
-            log.lock().unwrap_or_else(PoisonError::into_inner).push((address, word));
-        };
-        let answer = |words: Vec<u16>| {
-            let bytes = words.iter().flat_map(|word| word.to_be_bytes());
-            [request[0], 2 * words.len() as u8].into_iter().chain(bytes).collect()
-        };
-        match request[0] {
-            3 => {
-                let read = |address| holding.get(&address).copied().unwrap_or(0);
-                answer((word(1)..word(1) + word(3)).map(read).collect())
-            }
-            4 => {
-                let read = |address: u16| SENSORS.get(usize::from(address)).copied().unwrap_or(0);
-                answer((word(1)..word(1) + word(3)).map(read).collect())
-            }
-            6 => {
-                write(word(1), word(3));
-                request.to_vec()
-            }
-            16 => {
-                for place in 0..word(3) {
-                    write(word(1) + place, word(6 + 2 * usize::from(place)));
-                }
-                request[..5].to_vec()
-            }
-            function => vec![function | 0x80, 1],
-        }
-    });
-    (port, written)
+/// The order was taken by the remote I/O.
+fn operate(run: &str, what: &str, text: &str, more: &[&str]) -> Value {
+    let order = ["operate", run, "--name", "one-io", what, text, "--reason", "a test"];
+    let (status, document, _) = answer(&[&order[..], more].concat());
+    assert_eq!(status, 0, "{what} {text}: {document:#}");
+    document["result"].clone()
 }
 
-/// One of the two files of a change.
-struct Side {
-    file: PathBuf,
-    cluster: Cluster,
-}
-
-impl Side {
-    fn write(folder: &Path, program: &str, settings: &str) -> Self {
-        fs::create_dir_all(folder).expect("a folder");
-        let text = format!("{CLUSTER}{settings}");
-        fs::write(folder.join("drive.st"), program).expect("written");
-        let file = folder.join("cluster.toml");
-        fs::write(&file, &text).expect("written");
-        let loaded = read("cluster.toml", &text, &mut |_| Ok(program.to_owned()));
-        let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
-        Self { file, cluster }
-    }
-
-    fn hash(&self) -> ProgramHash {
-        self.cluster.controllers()[0].hash
-    }
-
-    /// The value of an output in the words of an image.
-    fn output(&self, event: &Value, name: &str) -> u64 {
-        let words = event["outputs"]["words"].as_array().expect("words");
-        let words: Vec<u64> = words.iter().filter_map(Value::as_u64).collect();
-        let outputs = &self.cluster.controllers()[0].interface.outputs;
-        outputs.find(name).expect("an output").get(&words)
-    }
-}
-
-/// A laboratory that runs the file before, and the change.
-struct Cell {
-    before: Side,
-    after: Side,
-    texts: ChangeTexts,
-    laboratory: Child,
-    runs: PathBuf,
-    run: PathBuf,
-    commander: Commander,
-    records: Records,
-}
-
-impl Cell {
-    fn start(name: &str, before: &str, after: &str) -> Self {
-        let out = empty_folder(name);
-        let before = Side::write(&out.join("before"), BEFORE, before);
-        let after = Side::write(&out.join("after"), AFTER, after);
-        let texts = ChangeTexts::with_points(&before.cluster, &after.cluster);
-        let texts = texts.expect("an online change");
-        let runs = out.join("runs");
-        let more = ["--cycles", "100000", "--allow-commands"];
-        let file = before.file.to_str().expect("text");
-        let (laboratory, _errors) =
-            running_with(&["lab", file, "--link", "udp", "--out"], &runs, &more, "synchronised: ");
-        let run = fs::canonicalize(runs.join("latest")).expect("a run");
-        let (commander, records) = (Commander::of_run(run.clone()), Records::of(&run));
-        Self { before, after, texts, laboratory, runs, run, commander, records }
-    }
-
-    fn act(&self, member: Member, command: Command) -> Result<(), String> {
-        let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
-        let action = OperatorAction::Command { member, command, owner, reason };
-        self.commander.act_and_wait(&action).map(|_| ()).map_err(|why| why.to_string())
-    }
-
-    /// Gives a step to a member until it is taken: a frame that it waits for, or the end of a history, comes soon.
-    fn step(&self, member: Member, request: &ChangeRequest) {
-        let deadline = Instant::now() + DEADLINE;
-        loop {
-            let done = self.act(member, Command::Change { request: request.clone() });
-            let Err(why) = done else {
-                return;
-            };
-            let waits = ["U0634", "U0636", "U0557"].iter().any(|code| why.starts_with(code));
-            assert!(waits && Instant::now() < deadline, "{request:?}: {why}");
-            std::thread::yield_now();
-        }
-    }
-
-    fn prepare(&self) {
-        let file = self.run.join("texts.json");
-        fs::write(&file, serde_json::to_vec(&self.texts).expect("JSON")).expect("written");
-        let request = ChangeRequest::Prepare { file: file.to_str().expect("text").to_owned() };
-        self.before.cluster.members().for_each(|member| self.step(member, &request));
-    }
-
-    /// The outputs of the cycle from which on the points of a side count, as the remote I/O applied them.
-    fn switch(&mut self, to: ProgramHash) -> Value {
-        self.step(DRIVE_IO, &ChangeRequest::Switch { change: self.texts.name(), to });
-        let changed = |record: &Value| is(record, "drive-io", "points-changed");
-        let changed = self.records.wait_for("the change of the points", changed);
-        assert_eq!(changed["event"]["to"], to.0);
-        let moment = changed["event"]["moment"].clone();
-        let applied = |record: &Value| {
-            is(record, "drive-io", "applied") && record["event"]["moment"] == moment
-        };
-        let applied = self.records.wait_for("the outputs of that cycle", applied);
-        assert!(applied["event"]["missing"].is_null(), "{applied}");
-        applied["event"].clone()
-    }
-
-    fn cancel(&mut self) -> Value {
-        let applied = self.switch(self.before.hash());
-        let (change, configuration) = (self.texts.name(), self.texts.before);
-        let forget = ChangeRequest::Forget { change, configuration };
-        self.before.cluster.members().for_each(|member| self.step(member, &forget));
-        applied
-    }
-
-    /// Ends it; the cycles in which no output of the program was proved, but for those in which this machine stood still.
-    fn end(mut self) -> Vec<Value> {
-        signal(self.laboratory.id(), Signal::SIGINT);
-        self.laboratory.wait().expect("it ends");
-        no_orphan(&self.runs);
-        let journal = fs::read_to_string(self.run.join("journal.jsonl")).expect("a journal");
-        let records =
-            journal.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
-        let records: Vec<Value> = records.collect();
-        if records.iter().any(|record| record["event"]["event"] == "stalled") {
-            return Vec::new();
-        }
-        let of = |record: &&Value| is(record, "drive-io", "applied");
-        let applied = records.into_iter().filter(|record| of(&record));
-        // Before the first proved outputs the stations are not synchronised.
-        let applied = applied.skip_while(|record| !record["event"]["missing"].is_null());
-        applied.filter(|record| !record["event"]["missing"].is_null()).collect()
-    }
-}
-
-/// What was written to one register from a place of the log on.
-fn of_register(log: &[(u16, u16)], register: u16) -> Vec<u16> {
-    log.iter().filter(|(address, _)| *address == register).map(|(_, word)| *word).collect()
-}
-
-/// Waits until a register has had a value.
-fn written(log: &Written, from: usize, register: u16, wanted: u16) {
+/// The program in `top`, once all inputs and outputs have these values.
+fn wait_for(run: &str, inputs: &dyn Fn(&Row) -> Value, outputs: &dyn Fn(&Row) -> Value) -> Value {
     let deadline = Instant::now() + DEADLINE;
-    let has = || {
-        let log = log.lock().unwrap_or_else(PoisonError::into_inner);
-        log[from..].contains(&(register, wanted))
-    };
-    while !has() {
-        assert!(Instant::now() < deadline, "{wanted} was not written to register {register}");
-        std::thread::yield_now();
+    loop {
+        let (_, document, _) = answer(&["top", run]);
+        let program = &document["result"]["programs"][0];
+        let differs = POINTS.iter().find(|row| {
+            let values = &program["values"];
+            let output = &values[format!("q{}", row.name)];
+            values[row.name] != inputs(row) || *output != outputs(row)
+        });
+        let Some(row) = differs else {
+            return program.clone();
+        };
+        assert!(Instant::now() < deadline, "{}: {program:#}", row.name);
     }
 }
 
-fn length(log: &Written) -> usize {
-    log.lock().unwrap_or_else(PoisonError::into_inner).len()
+/// A text of a cluster file as a person types it.
+fn typed(text: &str) -> String {
+    text.replace('"', "")
 }
 
-/// The registers of the device tell that outputs are driven at the places of the program that runs, from the cycle of the switch on, that those which are gone
-/// got their fail-safe value once, and that no cycle was missed; so it is on the way back.
 #[test]
-fn a_device_is_driven_by_the_points_of_the_program_that_runs() {
+fn forces_and_live_writes_are_of_the_declared_type() {
     let _one = some_at_a_time();
-    let (port, log) = device();
-    let field = |fail_safe: &str, places: &str| {
-        let timing = "timeout = \"500ms\"\nstale_after = \"2s\"";
-        format!(
-            "{fail_safe}\n\n[remote_io.field]\nmodbus = \"127.0.0.1:{port}\"\n{timing}\n{places}"
-        )
-    };
-    let before = field(FAIL_SAFE_BEFORE, PLACES_BEFORE);
-    let after = field(FAIL_SAFE_AFTER, PLACES_AFTER);
-    let mut cell = Cell::start("points_device", &before, &after);
-    written(&log, 0, 2, SENSORS[0]);
-    written(&log, 0, 1, SENSORS[1]);
-    cell.prepare();
-    let begun = length(&log);
-    let applied = cell.switch(cell.after.hash());
-    let first = cell.after.output(&applied, "extra");
-    // The new sensors are read, by their new places and types.
-    written(&log, begun, 11, SENSORS[6]);
-    written(&log, begun, 12, SENSORS[3] + 2);
-    // Who knows the file before alone does not reach another signal.
-    let run = cell.run.to_str().expect("text").to_owned();
-    let force = ["operate", &run, "--name", "drive-io", "force", "echo=99"];
-    let (exit, document, _) = answer(&force);
-    assert_eq!((exit, &document["failures"][0]["code"]), (1, &Value::from("U0638")), "{document}");
-    let middle = length(&log);
-    let applied = cell.cancel();
-    let again = cell.before.output(&applied, "shown");
-    written(&log, middle, 2, SENSORS[0]);
-    written(&log, middle, 1, SENSORS[1]);
-    let missed = cell.end();
-    assert!(missed.is_empty(), "{missed:?}");
-    let log = log.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    let place_of = |from: usize, places: RangeInclusive<u16>| {
-        let found = log[from..].iter().position(|(address, _)| places.contains(address));
-        from + found.expect("it was written")
-    };
-    // There: from the first write to a new place on.
-    let (there, back) = (place_of(begun, NEW_PLACES), middle);
-    let back = back
-        + log[back..]
-            .iter()
-            .position(|write| *write == (0, again as u16))
-            .expect("it is driven again");
-    for (register, last) in [(0, 71), (1, 72), (2, 73)] {
-        let gone = of_register(&log[there..back], register);
-        let before = of_register(&log[begun..there], register);
-        let left = before.iter().chain(&gone).filter(|word| **word == last).count();
-        assert_eq!(left, 1, "register {register}: {before:?} {gone:?}");
-        assert!(gone.iter().all(|word| *word == last), "register {register}: {gone:?}");
+    let out = empty_folder("live_points");
+    let program = format!("{DECLARED}{}END_PROGRAM\n", statements());
+    fs::write(out.join("one.st"), program).expect("written");
+    let cluster = out.join("cell.toml");
+    fs::write(&cluster, cluster_file("one.st")).expect("written");
+    let runs = out.join("runs");
+    let arguments = ["lab", cluster.to_str().expect("text"), "--period", PERIOD, "--out"];
+    let more = ["--cycles", "1000000", "--allow-commands"];
+    let (child, errors) = running_with(&arguments, &runs, &more, "synchronised: ");
+    let laboratory = Laboratory(child);
+    // It says more, and must not wait for a reader.
+    std::thread::spawn(move || std::io::copy(&mut { errors }, &mut std::io::sink()));
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    let run = run.to_str().expect("text");
+    wait_for(run, &Row::told_at_first, &Row::told_at_first);
+    for row in &POINTS {
+        let done = operate(run, "write", &format!("{}={}", row.name, typed(row.file)), &[]);
+        assert!(done["cycle"].is_i64(), "{}: {done}", row.name);
     }
-    assert_eq!(of_register(&log[there..], 10)[0], first as u16, "from the cycle of the switch on");
-    assert_eq!(of_register(&log[there..], 15)[0], first as u16);
-    assert!(!log.iter().any(|(address, word)| (*address, *word) == (11, 99)));
-    // Back: what only the new program has got its fail-safe value once, and nothing else.
-    for (register, last) in [(10, 81), (11, 82), (12, 83), (14, 0), (15, 84)] {
-        let gone = of_register(&log[back..], register);
-        let near = of_register(&log[middle..], register);
-        assert!(gone.iter().all(|word| *word == last), "register {register}: {gone:?}");
-        let left = near.iter().filter(|word| **word == last).count();
-        assert!(register == 14 || left == 1, "register {register}: {near:?}");
+    wait_for(run, &Row::told, &Row::told);
+    // Inputs stay what they are, outputs become the least values.
+    for row in &POINTS {
+        let text = format!("q{}={}", row.name, typed(row.safe));
+        operate(run, "force", &text, &["--seconds", "600"]);
     }
-    assert!(
-        OLD_PLACES
-            .chain(NEW_PLACES)
-            .all(|place| log.iter().any(|(address, _)| *address == place) || place == 13)
-    );
+    let program = wait_for(run, &Row::told, &Row::told_at_first);
+    let forced = program["forced"].as_array().expect("a list");
+    assert_eq!(forced.len(), POINTS.len(), "{program:#}");
+    for row in &POINTS {
+        operate(run, "unforce", &format!("q{}", row.name), &[]);
+    }
+    wait_for(run, &Row::told, &Row::told);
+    // A force of an input is sampled.
+    for row in &POINTS {
+        let text = format!("{}={}", row.name, typed(row.safe));
+        operate(run, "force", &text, &["--seconds", "600"]);
+    }
+    wait_for(run, &Row::told_at_first, &Row::told_at_first);
+    for row in &POINTS {
+        operate(run, "unforce", row.name, &[]);
+    }
+    wait_for(run, &Row::told, &Row::told);
+    by_python(run);
+    laboratory.end(&runs);
+    in_the_journal(run);
 }
 
-/// The controller is dead while the points change: the outputs of that very cycle are reconstructed, by the points of the new program; back in the cell, it
-/// follows, and the way back goes the same way.
-#[test]
-fn points_change_while_a_station_is_dead() {
-    let _one = some_at_a_time();
-    let mut cell = Cell::start("points_killed", FAIL_SAFE_BEFORE, FAIL_SAFE_AFTER);
-    let controller = Member::Station(StationId(0));
-    cell.prepare();
-    cell.act(controller, Command::Kill).expect("it is killed");
-    cell.records.wait_for("its end", |record| is(record, "drive-io", "unprotected"));
-    let applied = cell.switch(cell.after.hash());
-    assert_eq!(applied["source"], "reconstructed", "{applied}");
-    assert_eq!(
-        cell.after.output(&applied, "extra"),
-        cell.after.output(&applied, "shown"),
-        "{applied}"
-    );
-    cell.act(controller, Command::Restart).expect("it starts again");
-    cell.records.wait_for("its state", |record| is(record, "drive", "synchronised"));
-    cell.records.wait_for("protection", |record| is(record, "drive-io", "protected"));
-    let applied = cell.cancel();
-    assert_eq!(applied["source"], "direct", "{applied}");
-    let missed = cell.end();
-    assert!(missed.is_empty(), "{missed:?}");
+/// The client reads each value as one of its declaration, and writes what it has read.
+fn by_python(run: &str) {
+    let Some(python) = python("zenoh") else {
+        return;
+    };
+    let gateway = Gateway::of("zenoh", Path::new(run));
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/laboratory/points_client.py");
+    let mut client = Command::new(python)
+        .arg(script)
+        .arg(&gateway.address)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("it ran a moment ago");
+    let least = POINTS.iter().map(|row| (row.name.to_owned(), row.told_at_first()));
+    let least: serde_json::Map<String, Value> = least.collect();
+    let mut input = client.stdin.take().expect("piped");
+    writeln!(input, "{}", Value::from(least)).expect("it reads");
+    drop(input);
+    let output = client.wait_with_output().expect("it ends");
+    assert!(output.status.success());
+    let read: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for (seen, expected) in
+        [("before", Row::told as fn(&Row) -> Value), ("after", Row::told_at_first)]
+    {
+        for row in &POINTS {
+            let of_input = &read[seen]["inputs"][row.name];
+            let of_output = &read[seen]["outputs"][format!("q{}", row.name)];
+            let of_both = [of_input, of_output];
+            assert_eq!(of_both, [&expected(row); 2], "{seen} {}: {read:#}", row.name);
+        }
+    }
+    // What is no value of the declaration is refused with the code of the terminal.
+    let refused = read["refused"].as_array().expect("a list");
+    assert_eq!(refused.len(), POINTS.len(), "{read:#}");
+    assert!(refused.iter().all(|of_input| of_input[1] == "U0641"), "{read:#}");
+}
+
+/// The journal has each order in the words of its declaration.
+fn in_the_journal(run: &str) {
+    let listed = |event: &str| {
+        let (status, document, _) = answer(&["journal", run, "--event", event]);
+        assert_eq!(status, 0, "{document:#}");
+        let lines = document["result"]["lines"].as_array().expect("a list").clone();
+        lines.iter().map(|line| line["text"].as_str().unwrap_or_default().to_owned()).collect()
+    };
+    let (written, forced): (Vec<String>, Vec<String>) = (listed("written"), listed("forced"));
+    for row in &POINTS {
+        let least = row.safe_shown();
+        let lines = [
+            (&written, format!(" writes {} to input {}: a test", row.shown, row.name)),
+            (&forced, format!("output q{} is forced to {least} for 600 s by ", row.name)),
+            (&forced, format!("input {} is forced to {least} for 600 s by ", row.name)),
+        ];
+        for (listed, wanted) in lines {
+            assert!(listed.iter().any(|line| line.contains(&wanted)), "{wanted}: {listed:#?}");
+        }
+    }
 }

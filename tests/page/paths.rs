@@ -68,7 +68,7 @@ fn a_finished_run_answers_every_question() {
         .expect("a memory bit of the robot");
     assert_eq!(
         (&memory["id"], &memory["kind"], &memory["type"]),
-        (&"0.state.holding".into(), &"memory".into(), &"BOOL".into())
+        (&"0.state.holding".into(), &"variable".into(), &"BOOL".into())
     );
     let trend = page.get("/api/trends?signals=0.state.holding,0.input.0&from=40&to=290").json();
     let runs = trend["signals"][0]["runs"].as_array().expect("runs");

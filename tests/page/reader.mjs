@@ -75,22 +75,22 @@ async function ladder() {
 
 async function watch() {
   await open("watch");
-  const signals = { "0.state.laps": "robot.laps", "0.state.lap.time": "TIME", "0.state.holding": "gripper holds", "0.input.3": "arm_up", "1.output.0": "%QX0.0" };
+  const signals = { "0.state.laps.CV": "robot.laps.CV", "0.state.lap.time.ET": "TIME", "0.state.holding": "gripper holds", "0.input.3": "arm_up", "1.output.0": "%QX0.0" };
   for (const [signal, words] of Object.entries(signals)) {
     await change("#watch-search", words);
     await until(signal, `document.querySelector('#view-watch input[value="${signal}"]') !== null`);
     await click(`#view-watch input[value="${signal}"]`);
   }
-  await until("a counter that counts", `Number(document.querySelector('[data-signal="0.state.laps"]')?.dataset.value) > 1`);
-  await until("a timer that runs", `/^([1-9]\\d*s)?([1-9]\\d*ms)?$/.test(document.querySelector('[data-signal="0.state.lap.time"]')?.dataset.value)`);
+  await until("a counter that counts", `Number(document.querySelector('[data-signal="0.state.laps.CV"]')?.dataset.value) > 1`);
+  await until("a timer that runs", `/^([1-9]\\d*s)?([1-9]\\d*ms)?$/.test(document.querySelector('[data-signal="0.state.lap.time.ET"]')?.dataset.value)`);
   await picture("watch");
   await accessible("watch", axe);
-  await until("the address", `location.hash.includes("signals=0.state.laps,0.state.lap.time,0.state.holding,0.input.3,1.output.0")`);
+  await until("the address", `location.hash.includes("signals=0.state.laps.CV,0.state.lap.time.ET,0.state.holding,0.input.3,1.output.0")`);
   await call("Page.reload");
   await until("the same table", `${rows("watch-table")}.length === 5 && document.querySelector('[data-signal="0.state.holding"]').dataset.value !== undefined`);
   await click("#back");
   const ofCycle = `${text("#watch-words")}.startsWith("cycle " + (location.hash.match(/cycle=(\\d+)/)?.[1] ?? "?") + ";")`;
-  await until("its address", `${ofCycle} && location.hash.includes("signals=0.state.laps,0.state.lap.time,0.state.holding,0.input.3,1.output.0")`);
+  await until("its address", `${ofCycle} && location.hash.includes("signals=0.state.laps.CV,0.state.lap.time.ET,0.state.holding,0.input.3,1.output.0")`);
   const [address, values] = await evaluate(`[location.hash, ${rows("watch-table")}.map((row) => row.dataset.value).join()]`);
   await elsewhere(address);
   await until("the same values", `${ofCycle} && ${rows("watch-table")}.map((row) => row.dataset.value).join() === ${JSON.stringify(values)}`);
@@ -98,7 +98,7 @@ async function watch() {
 }
 
 async function trends() {
-  await open("trends?signals=0.state.laps,0.state.lap.time,0.output.4&span=100");
+  await open("trends?signals=0.state.laps.CV,0.state.lap.time.ET,0.output.4&span=100");
   await until("trends", `document.querySelector("#trend-plot canvas") !== null && [...document.querySelectorAll(".u-legend .u-value")].some((value) => /\\dm?s/.test(value.textContent))`);
   await evaluate("(window.saved = [], window.make = URL.createObjectURL, URL.createObjectURL = (blob) => (saved.push(blob), make.call(URL, blob)))");
   await click("#trend-in");
@@ -108,12 +108,12 @@ async function trends() {
   await click("#trend-csv");
   await until("a table", "saved.length === 1");
   const lines = (await evaluate("saved[0].text()")).trimEnd().split("\r\n");
-  check(`the head is ${lines[0]}`, lines[0] === "cycle,time_s,time_of_day,robot.laps,robot.lap.time in ns,robot.grip,source of robot,source of press");
+  check(`the head is ${lines[0]}`, lines[0] === "cycle,time_s,time_of_day,robot.laps.CV,robot.lap.time.ET in ns,robot.grip,source of robot,source of press");
   check(`${lines.length} lines of cycles ${from} to ${to}`, lines.length === to - from + 2);
   for (const line of [lines[1], lines.at(-1)]) {
     const [cycle, seconds, at, laps, time] = line.split(",");
     check(`${line} has no time of day`, /^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}(Z|[+-]\d\d:\d\d)$/.test(at));
-    const values = await evaluate(`fetch("/api/values?signals=0.state.laps,0.state.lap.time&cycle=${cycle}").then((answer) => answer.json()).then(({ values }) => values.join())`);
+    const values = await evaluate(`fetch("/api/values?signals=0.state.laps.CV,0.state.lap.time.ET&cycle=${cycle}").then((answer) => answer.json()).then(({ values }) => values.join())`);
     check(`${line}, but the values are ${values}`, values === `${laps},${time}` && Number(seconds) === (cycle * 50) / 1000);
   }
   await click("#trend-png");
@@ -205,7 +205,7 @@ async function drive() {
   await size(390, 844, true);
   await scheme("dark");
   await until("the dark", "document.documentElement.dataset.theme === 'dark'");
-  for (const view of ["events", "ladder", "watch?signals=0.state.laps,0.state.lap.time", "trends"]) {
+  for (const view of ["events", "ladder", "watch?signals=0.state.laps.CV,0.state.lap.time.ET", "trends"]) {
     await open(view);
     const name = view.split("?")[0];
     await until(view, `!document.getElementById("view-${name}").hidden`);

@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_bits::exact;
-use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::{Source, USUAL_PERIOD, Wanted, read_ladder};
+use understudy_cluster::{Cluster, Code, Overrides, SourceText};
+use understudy_interchange::{Rungs, Source, USUAL_PERIOD, Wanted, read_ladder};
 use understudy_ladder::{Program, from_circuit};
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
@@ -41,8 +40,8 @@ pub(crate) struct Member {
     /// What is counted: of a program that is not drawn as a ladder, the rungs of its statements or of its circuit.
     pub(crate) ladder: Program,
     pub(crate) circuit: Circuit,
-    /// The program, where it is not drawn as a ladder.
-    pub(crate) typed: Option<Arc<Typed>>,
+    /// The program.
+    pub(crate) typed: Arc<Typed>,
 }
 
 impl Group {
@@ -128,21 +127,17 @@ fn ladder(path: &Path, period: Duration) -> Result<(Member, Vec<Report>), Answer
     let wanted = Wanted { program: None, period: Some(period) };
     let failed = |code, message: String| Answer::failed(Status::BadInput, code, message);
     let (source, file, _) = files::program(path, wanted)?;
-    let is_ladder = file.rungs.is_some_and(|rungs| rungs.are_written);
-    let typed = match source {
-        Source::Program(typed) if !is_ladder => Some(typed),
-        _ => None,
+    let Source::Program(typed) = source else {
+        return Err(Answer::bad_files(reports));
     };
-    let circuit = match &typed {
-        Some(typed) => {
-            exact(typed).map_err(|inexact| failed(inexact.code_or("U0438"), inexact.to_string()))
-        }
-        None => {
-            ladder.lower(period).map_err(|error| failed(error.code_or("U0436"), error.to_string()))
-        }
-    };
-    let (name, circuit) = (ladder.name.to_string(), circuit?);
-    Ok((Member { name, ladder, circuit, typed }, reports))
+    let text = SourceText::of(&file.report.name, &file.report.text, period);
+    let code = Code::of(Arc::clone(&typed), file.rungs.and_then(Rungs::written), Arc::new(text))
+        .map_err(|error| failed(error.code_or("U0436"), error.to_string()))?;
+    let circuit = code.exact_circuit();
+    let circuit =
+        circuit.map_err(|inexact| failed(inexact.code_or("U0438"), inexact.to_string()))?;
+    let circuit = circuit.into_owned();
+    Ok((Member { name: ladder.name.to_string(), ladder, circuit, typed }, reports))
 }
 
 fn of_ladders(members: Vec<Member>, period: Duration, prefix: String) -> Result<Group, Answer> {
@@ -163,16 +158,14 @@ fn of_cluster(cluster: Cluster, prefix: String) -> Result<Group, Answer> {
         .map_err(|(code, reason)| Answer::failed(Status::BadInput, code, reason))?;
     let period = cluster.agreement().schedule.period();
     let members = cluster.controllers().iter().zip(circuits).map(|(controller, circuit)| {
-        let of_text = |text| read_ladder(&controller.file, text, Some(period)).program;
-        let ladder = controller.ladder().cloned();
-        let typed = controller.ladder().is_none().then(|| Arc::clone(controller.code.typed()));
-        let text = controller.code.source_text();
-        let ladder = ladder.or_else(|| text.and_then(|text| of_text(text)));
+        let text = &controller.code.source().text;
+        let ladder = read_ladder(&controller.file, text, Some(period)).program;
+        let ladder = ladder.unwrap_or_else(|| from_circuit(&circuit));
         Member {
             name: controller.name.clone(),
-            ladder: ladder.unwrap_or_else(|| from_circuit(&circuit)),
+            ladder: Program { name: controller.name.as_str().into(), ..ladder },
             circuit,
-            typed,
+            typed: Arc::clone(controller.code.typed()),
         }
     });
     Ok(Group {

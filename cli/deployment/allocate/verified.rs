@@ -62,7 +62,7 @@ pub(super) fn members(
     let members = group.members.iter().enumerate().map(|(place, member)| {
         let name = group.name(&member.name);
         let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);
-        let subject = subject(member, group.period, properties)?;
+        let subject = subject(member, properties)?;
         patience.turn_to(format!("`{name}`"));
         let remote_io = match &group.cluster {
             Some(cluster) => group.name(&cluster.remote_ios()[place].name),
@@ -87,7 +87,6 @@ pub(super) fn members(
 /// A program ready for its properties.
 fn subject(
     member: &programs::Member,
-    period: Duration,
     properties: &[(Report, Properties)],
 ) -> Result<Subject, Answer> {
     let failed = |code, error: &dyn Display| Answer::failed(Status::BadInput, code, error);
@@ -105,12 +104,7 @@ fn subject(
         }
         Ok(())
     };
-    let Some(typed) = &member.typed else {
-        let subject = Subject::new(&member.ladder, period, &asked)
-            .map_err(|error| failed(error.code_or("U0436"), &error))?;
-        right(&|assumed| subject.wrong_assumption(assumed))?;
-        return Ok(subject);
-    };
+    let typed = &member.typed;
     let model = Model::of_program(typed, &asked).map_err(inexact)?;
     right(&|assumed| model.wrong_assumption(assumed))?;
     model.exact().map_err(|found| inexact(found.told_by(typed)))

@@ -1,8 +1,7 @@
 //! What a program keeps over a restart.
 
 use serde::Serialize;
-use understudy_bits::Exact;
-use understudy_ladder::{Executed, Program as Ladder};
+use understudy_executable::Executable;
 use understudy_typed::Program;
 
 /// Names that a line lists.
@@ -23,23 +22,20 @@ pub(super) struct Retained {
 }
 
 impl Retained {
-    /// Of a program with retentive variables; of one that is written in rungs, of the circuit that stations execute.
-    pub(super) fn of(program: &Program, ladder: Option<&Ladder>) -> Option<Self> {
+    /// Of a program with retentive variables, as stations execute it.
+    pub(super) fn of(
+        program: &Program,
+        executable: impl FnOnce() -> Option<Executable>,
+    ) -> Option<Self> {
         if !program.is_retentive() {
             return None;
         }
-        let (mask, state_bits) = match ladder {
-            Some(ladder) => {
-                let Exact { circuit, layout, .. } = Executed::new(program, ladder).ok()?.kept;
-                (layout.retentive_mask(program), circuit.registers().len())
-            }
-            None => (program.retentive_mask(), program.state as usize * 64),
-        };
-        let kept_bits = mask.iter().map(|word| word.count_ones() as usize).sum();
+        let executable = executable()?;
+        let kept = executable.retained().into_iter().flatten();
         Some(Self {
             variables: program.retentive_names(),
-            kept_bits,
-            state_bits,
+            kept_bits: kept.map(|word| word.count_ones() as usize).sum(),
+            state_bits: executable.state_count(),
             bytes_a_day: None,
         })
     }

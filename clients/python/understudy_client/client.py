@@ -15,7 +15,7 @@ from typing import Any
 import zenoh
 
 #: A value of an input or output.
-Value = bool | int | float | None
+Value = bool | int | float | str | None
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class Program:
     name: str
     #: Source of the applied outputs: `direct`, `reconstructed`, `held` or `fail-safe`; None before the first deadline.
     source: str | None
-    #: By name: a BOOL as `bool`, an integer, bit string or time (in nanoseconds) as `int`, a REAL or LREAL as `float`, or None where it is not finite.
+    #: By name: a BOOL as `bool`, an integer, bit string or time (in nanoseconds) as `int`, a REAL or LREAL as `float`, or None where it is not finite, a
+    #: date or a value of an enumeration as `str`.
     inputs: dict[str, Value] | None
     outputs: dict[str, Value] | None
     #: Number of deadlines by source.

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use understudy_ladder::{BlockKind, CoilKind, ContactKind, Element, Program, Signal, visit};
+use understudy_ladder::{CoilKind, ContactKind, Cost, Element, Program, Signal, visit};
 
 use crate::instructions::instructions;
 
@@ -87,15 +87,10 @@ impl Resources {
             Element::Branches(branches) => self.branches += branches.len().saturating_sub(1) as u64,
             Element::Block(block) => {
                 self.blocks += 1;
-                match block.kind {
-                    BlockKind::Ton(_) | BlockKind::Tof(_) | BlockKind::Tp(_) => self.timers += 1,
-                    BlockKind::Ctu(_) | BlockKind::Ctd(_) | BlockKind::Ctud(_) => {
-                        self.counters += 1;
-                    }
-                    BlockKind::Sr | BlockKind::Rs | BlockKind::RTrig | BlockKind::FTrig => {
-                        self.data_bits += 1;
-                    }
-                }
+                let Cost { timers, counters, bits } = block.kind.cost();
+                self.timers += timers;
+                self.counters += counters;
+                self.data_bits += bits;
             }
         }
     }

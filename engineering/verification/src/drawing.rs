@@ -5,9 +5,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 use understudy_text::markup::escaped;
 
-use understudy_ladder::{
-    Element, Evaluation, Interpreter, LowerError, Program, Rung, draw_svg_rungs, visit,
-};
+use understudy_ladder::{Evaluation, Interpreter, LowerError, Program, Rung, draw_svg_rungs};
 use understudy_logic::Circuit;
 
 use crate::symbolic::Trace;
@@ -139,14 +137,7 @@ fn stem(name: &str) -> String {
 
 /// What a rung reads, and what it writes.
 fn names_of(rung: &Rung) -> (Vec<String>, Vec<String>) {
-    let mut reads = Vec::new();
-    let targets = rung.coils.iter().map(|coil| coil.target.to_string());
-    let mut writes: Vec<String> = targets.collect();
-    visit(&rung.network, &mut |element| match element {
-        Element::Contact(contact) => reads.push(stem(&contact.operand)),
-        Element::Comparison(comparison) => reads.push(comparison.counter.to_string()),
-        Element::Block(block) => writes.push(block.name.to_string()),
-        Element::Branches(_) => {}
-    });
-    (reads, writes)
+    let (read, written) = rung.names();
+    let written = written.into_iter().map(str::to_owned);
+    (read.into_iter().map(stem).collect(), written.collect())
 }

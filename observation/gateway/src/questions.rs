@@ -19,7 +19,7 @@ struct Asked {
     name: String,
     /// Operator input.
     input: String,
-    /// A number, true or false, or a text as a person types it.
+    /// A number, of a TIME its nanoseconds, true or false, or a text as a person types it.
     value: Value,
     owner: String,
     reason: String,
@@ -51,13 +51,14 @@ async fn done(gate: &WriteGate, text: &str) -> Result<u64, Refusal> {
         gate.refuse(&asked.name, &asked.input, &asked.owner, &asked.reason, &refusal);
         refusal
     })?;
-    let value = match &asked.value {
+    let text = match &asked.value {
         Value::String(text) => text.clone(),
         value => value.to_string(),
     };
+    let number = asked.value.as_i64().map(RequestedValue::Number);
     let request = WriteRequest {
         input: &asked.input,
-        value: RequestedValue::Text(&value),
+        value: number.unwrap_or(RequestedValue::Text(&text)),
         role: Role::Operator,
         owner: &asked.owner,
         reason: &asked.reason,

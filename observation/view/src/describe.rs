@@ -73,13 +73,11 @@ pub(crate) fn describe(
     writes: &Writes,
     cycles: &Cycles,
 ) -> Description {
+    let own = signals::Names { members: names, writes, cycles, by: record.member };
     let (event, level, text) = match &record.event {
         Happening::Station(event) => members::station(event, names),
-        Happening::RemoteIo(event) => {
-            let names = signals::Names { members: names, writes, cycles, by: record.member };
-            members::remote_io(event, &names)
-        }
-        Happening::Plant(event) => members::plant(event, names),
+        Happening::RemoteIo(event) => members::remote_io(event, &own),
+        Happening::Plant(event) => members::plant(event, &own),
         Happening::Host(event) => processes::host(event, names),
         Happening::Run(event) => processes::run(event, names),
     };

@@ -28,14 +28,18 @@ impl Model {
     ) -> Option<(String, Option<ViewError>)> {
         let version = self.version_in(program, Some(cycle))?;
         let code = &version.controller().code;
-        let (typed, text) = (code.typed(), code.source_text()?);
+        let units = version.drawing();
+        if units.is_empty() {
+            return None;
+        }
+        let typed = code.typed();
         let (trace, error) = match self.trace(program, cycle) {
             Ok(trace) => (Some(trace), None),
             Err(error) => (None, Some(error)),
         };
-        let lines = Lines::new(text);
+        let lines = Lines::new(&code.source().text);
         let mut picture = Picture::new();
-        for unit in version.drawing().iter().filter(|unit| unit.is_program) {
+        for unit in units.iter().filter(|unit| unit.is_program) {
             let mut unit = unit.clone();
             let scan = trace.as_ref().map(|trace| Scan::new(typed, trace, &unit.name));
             if let Some(scan) = scan {

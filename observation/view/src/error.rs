@@ -35,7 +35,7 @@ pub enum ViewError {
         wrong: WrongVersion,
     },
     /// No program has an output of this name.
-    #[error("U0573: no program has an output `{name}`; {hint}")]
+    #[error("U0573: no program has an output or a variable `{name}`; {hint}")]
     NoOutput {
         /// As it was asked for.
         name: String,

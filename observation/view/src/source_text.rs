@@ -394,9 +394,7 @@ mod tests {
                 read_with("cluster.toml", &text, Overrides::default(), &mut |name| file(name));
             for controller in read.cluster.expect("right").controllers() {
                 let code = &controller.code;
-                let (typed, Some(text)) = (code.typed(), code.source_text()) else {
-                    continue;
-                };
+                let (typed, text) = (code.typed(), &code.source().text);
                 let source = SourceText::new(text);
                 let lines = source.lines().iter().filter(|line| line.is_program);
                 let declared = lines

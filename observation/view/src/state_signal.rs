@@ -1,4 +1,4 @@
-//! The state of a program by name: memory bits, timers and counters of a ladder, variables of a program with numbers.
+//! The state of a program by name: its variables, and the parts of those that have some, such as `pause.ET` of a timer.
 //!
 //! Their values in a cycle are those after its scan, recomputed from the samples in the journal.
 
@@ -6,8 +6,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 use understudy_cluster::Controller;
-use understudy_ladder::{BlockKind, Element, Evaluation, Program as Ladder, Reading, visit};
-use understudy_typed::{Enumeration, Part, Program as TypedProgram};
+use understudy_typed::{Enumeration, Part};
 use understudy_wire::{ProgramHash, ProgramId};
 
 use crate::error::ViewError;
@@ -18,26 +17,11 @@ use crate::value::{number, shown};
 /// Signals of one program that are listed, at most; the first ones.
 const MAXIMUM_SIGNALS: usize = 2000;
 
-/// Kind of a signal in the state of a program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StateKind {
-    /// A memory bit of a ladder.
-    Memory,
-    /// Elapsed time of a timer, as a number of nanoseconds.
-    Timer,
-    /// Value of a counter.
-    Counter,
-    /// A variable of a program with numbers, or a part of one.
-    Variable,
-}
-
 /// A signal in the state of a program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StateSignal {
     /// Its name, such as `pressing` or `pid.integral`.
     pub name: String,
-    /// Its kind.
-    pub kind: StateKind,
     /// Its type, such as `BOOL`.
     pub of: String,
     /// Its address, such as `%MX0.0`.
@@ -46,29 +30,8 @@ pub struct StateSignal {
     pub description: Option<String>,
     /// Its program.
     program: ProgramHash,
-    place: Place,
-}
-
-/// Where its value is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Place {
-    /// Number of the memory bit.
-    Memory(usize),
-    /// Rung, and the element in it in the order of [`visit`].
-    Block(usize, usize),
-    Part(Part),
-}
-
-impl StateKind {
-    /// The kind in one word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Memory => "memory",
-            Self::Timer => "timer",
-            Self::Counter => "counter",
-            Self::Variable => "variable",
-        }
-    }
+    /// The variable of the program that it is.
+    part: Part,
 }
 
 impl Model {
@@ -101,16 +64,22 @@ impl Model {
         signals: &[StateSignal],
     ) -> Result<Vec<Value>, ViewError> {
         let version = self.version_at(history, place)?;
-        let values = |value: &dyn Fn(&StateSignal) -> Value| {
-            let own = signals.iter().map(|signal| version.signal(signal));
-            own.map(|own| own.map_or(Value::Null, value)).collect()
-        };
-        if version.controller().ladder().is_some() {
-            let evaluation = self.evaluation_at(history, place)?;
-            return Ok(values(&|signal| signal.in_scan(&evaluation)));
-        }
         let state = self.state_after(history, place)?;
-        Ok(values(&|signal| signal.in_state(&state)))
+        let own = signals.iter().map(|signal| version.signal(signal));
+        Ok(own.map(|own| own.map_or(Value::Null, |own| own.in_state(&state))).collect())
+    }
+
+    /// x(t+1) of the program that took the sample of a step, in the order of its variables.
+    pub(crate) fn state_after(
+        &self,
+        history: &History,
+        place: usize,
+    ) -> Result<Vec<u64>, ViewError> {
+        let (version, mut state) = self.typed_state_at(history, place)?;
+        let sampled = self.sampled_at(history, place)?;
+        let mut outputs = vec![0; sampled.outputs.words().len()];
+        version.interpreter().step(&mut state, sampled.inputs.words(), &mut outputs);
+        Ok(state)
     }
 
     /// The values of signals in the state of a program after each scan from one cycle to another, as far as they are known; the newest
@@ -164,17 +133,6 @@ impl Model {
         let code = &controller.ok_or_else(|| self.other_program(program, cycle))?.code;
         Ok((cycle, code.after_scan(sampled.state.words(), sampled.inputs.words())))
     }
-
-    /// x(t+1) of a program with numbers.
-    fn state_after(&self, history: &History, place: usize) -> Result<Vec<u64>, ViewError> {
-        let sampled = self.sampled_at(history, place)?;
-        let interpreter = self.interpreter_of(history, place)?;
-        let mut outputs = vec![0; sampled.outputs.words().len()];
-        let mut state = sampled.state.words().to_vec();
-        state.resize(interpreter.state_words(), 0);
-        interpreter.step(&mut state, sampled.inputs.words(), &mut outputs);
-        Ok(state)
-    }
 }
 
 impl StateSignal {
@@ -185,106 +143,25 @@ impl StateSignal {
 
     /// Its names of values, where it is of an enumeration.
     pub fn values(&self) -> Option<&Enumeration> {
-        match &self.place {
-            Place::Part(part) => part.values.as_deref(),
-            Place::Memory(_) | Place::Block(..) => None,
-        }
+        self.part.values.as_deref()
     }
 
     /// A number of [`Model::state_values`] as [`crate::value_of`] has the value of a point.
     pub fn shown(&self, number: Value) -> Value {
-        let declared = match &self.place {
-            Place::Part(part) => part.declared(),
-            Place::Memory(_) | Place::Block(..) => None,
-        };
-        match declared.zip(number.as_i64()) {
+        match self.part.declared().zip(number.as_i64()) {
             Some((declared, stored)) => shown(&declared, stored as u64 & declared.of.mask()),
             None => number,
         }
     }
 
-    fn in_scan(&self, evaluation: &Evaluation) -> Value {
-        match &self.place {
-            Place::Memory(number) => evaluation.memory.get(*number).copied().into(),
-            Place::Block(rung, element) => {
-                let rung = evaluation.rungs.get(*rung);
-                let flow = rung.and_then(|rung| rung.elements.get(*element));
-                match flow.map(|flow| flow.reading) {
-                    Some(Reading::Number(number)) => number.into(),
-                    Some(Reading::Time(elapsed)) => u64::try_from(elapsed.as_nanos()).ok().into(),
-                    _ => Value::Null,
-                }
-            }
-            Place::Part(_) => Value::Null,
-        }
-    }
-
     fn in_state(&self, state: &[u64]) -> Value {
-        let Place::Part(part) = &self.place else {
-            return Value::Null;
-        };
-        part.stored(state).map_or(Value::Null, |(of, stored)| number(of, stored))
+        self.part.stored(state).map_or(Value::Null, |(of, stored)| number(of, stored))
     }
 }
 
-/// The signals in the state of the program of a controller.
+/// The signals in the state of the program of a controller: all that has a value of its own and is no input and no output.
 pub(crate) fn of_controller(controller: &Controller) -> Vec<StateSignal> {
-    match controller.ladder() {
-        Some(ladder) => of_ladder(controller, ladder),
-        None => of_typed(controller, controller.code.typed()),
-    }
-}
-
-fn of_ladder(controller: &Controller, ladder: &Ladder) -> Vec<StateSignal> {
-    let memory = ladder.memory.iter().enumerate();
-    let mut signals: Vec<StateSignal> = memory
-        .map(|(number, signal)| StateSignal {
-            name: signal.name.to_string(),
-            kind: StateKind::Memory,
-            of: "BOOL".to_owned(),
-            address: signal.address.as_ref().map(ToString::to_string),
-            description: signal.description.clone(),
-            program: controller.hash,
-            place: Place::Memory(number),
-        })
-        .collect();
-    for (number, rung) in ladder.rungs.iter().enumerate() {
-        let mut element = 0;
-        visit(&rung.network, &mut |seen| {
-            if let Element::Block(block) = seen
-                && let Some((kind, of)) = shown_as(block.kind)
-            {
-                signals.push(StateSignal {
-                    name: block.name.to_string(),
-                    kind,
-                    of: of.to_owned(),
-                    address: None,
-                    description: Some(format!("{} in rung {}", block.kind.word(), number + 1)),
-                    program: controller.hash,
-                    place: Place::Block(number, element),
-                });
-            }
-            element += 1;
-        });
-    }
-    signals.truncate(MAXIMUM_SIGNALS);
-    signals
-}
-
-fn shown_as(kind: BlockKind) -> Option<(StateKind, &'static str)> {
-    match kind {
-        BlockKind::Ton(_) | BlockKind::Tof(_) | BlockKind::Tp(_) => {
-            Some((StateKind::Timer, "TIME"))
-        }
-        BlockKind::Ctu(_) | BlockKind::Ctd(_) | BlockKind::Ctud(_) => {
-            Some((StateKind::Counter, "UINT"))
-        }
-        BlockKind::Sr | BlockKind::Rs | BlockKind::RTrig | BlockKind::FTrig => None,
-    }
-}
-
-/// All that has a value of its own and is no input and no output.
-fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
+    let typed = controller.code.typed();
     let interface = &controller.interface;
     let points = interface.inputs.iter().chain(interface.outputs.iter());
     let own: BTreeSet<u64> = points.map(|point| u64::from(point.slot)).collect();
@@ -306,12 +183,11 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
                 let is_whole = part.name == variable.name;
                 signals.push(StateSignal {
                     name: part.name.clone(),
-                    kind: StateKind::Variable,
                     of: declared.to_string(),
                     address: variable.address.clone().filter(|_| is_whole),
                     description: variable.description.clone().filter(|_| is_whole),
                     program: controller.hash,
-                    place: Place::Part(part),
+                    part,
                 });
             }
             // Elements of an array may share a slot; all else begins at one.

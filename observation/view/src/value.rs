@@ -67,6 +67,12 @@ pub(crate) fn point_text(point: &Point, image: &Image) -> String {
     stored_text(&point.declared(), point.get(image.words()))
 }
 
+/// Whether a program has points that are numbers.
+pub(crate) fn has_numbers(controller: &Controller) -> bool {
+    let interface = &controller.interface;
+    interface.inputs.iter().chain(&interface.outputs).any(|point| point.of != Elementary::Bool)
+}
+
 /// Whether a program declares the point of this name: its reset and its fault are told by events of their own.
 pub(crate) fn is_declared(name: &str) -> bool {
     ![Program::RESET, Program::FAULT].contains(&name)

@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
-use std::time::Duration;
 
 use understudy_cluster::Controller;
 use understudy_interchange::{Bodies, DrawnUnit, Listing, drawn_units};
@@ -23,7 +22,7 @@ const MOST: usize = 32;
 pub(crate) struct Version {
     controller: Controller,
     observer: OnceLock<Option<Observer>>,
-    interpreter: OnceLock<Option<Interpreter>>,
+    interpreter: OnceLock<Interpreter>,
     drawing: OnceLock<Vec<DrawnUnit>>,
     listing: OnceLock<Option<Listing>>,
     signals: OnceLock<BTreeMap<String, StateSignal>>,
@@ -47,34 +46,32 @@ impl Version {
     }
 
     /// The observer of its power flow; none where it is no ladder.
-    pub(crate) fn observer(&self, period: Duration) -> Option<&Observer> {
-        let observer = || Observer::new(self.controller.ladder()?, period).ok();
-        self.observer.get_or_init(observer).as_ref()
+    pub(crate) fn observer(&self) -> Option<&Observer> {
+        self.observer.get_or_init(|| self.controller.code.observer()).as_ref()
     }
 
-    /// The interpreter of its statements; none where it has no text.
-    pub(crate) fn interpreter(&self) -> Option<&Interpreter> {
-        let code = &self.controller.code;
-        let interpreter = || code.source_text().map(|_| Interpreter::new(code.typed()));
-        self.interpreter.get_or_init(interpreter).as_ref()
+    /// The interpreter of its statements, whose states are those of [`Code::typed_state`](understudy_cluster::Code::typed_state).
+    pub(crate) fn interpreter(&self) -> &Interpreter {
+        self.interpreter.get_or_init(|| Interpreter::new(self.controller.code.typed()))
     }
 
-    /// Its text, of a program with statements: that of its file, or what the bodies of a document mean.
+    /// Its text, of a program that is shown as statements: that of its file, or what the bodies of a document mean.
     pub(crate) fn text(&self) -> Option<SourceText<'_>> {
         let code = &self.controller.code;
-        let text = code.source_text()?;
-        let listing = self.listing.get_or_init(|| Listing::of(&code.source().file, text));
-        Some(listing.as_ref().map_or_else(|| SourceText::new(text), SourceText::of_listing))
+        if code.ladder().is_some() {
+            return None;
+        }
+        let source = code.source();
+        let listing = self.listing.get_or_init(|| Listing::of(&source.file, &source.text));
+        let text = || SourceText::new(&source.text);
+        Some(listing.as_ref().map_or_else(text, SourceText::of_listing))
     }
 
-    /// Its units as they are drawn, of a program with statements.
+    /// Its units as they are drawn; none of one in rungs.
     pub(crate) fn drawing(&self) -> &[DrawnUnit] {
         self.drawing.get_or_init(|| {
-            let Some(text) = self.controller.code.source_text() else {
-                return Vec::new();
-            };
-            drawn_units(&self.controller.code.source().file, text, Bodies::Blocks)
-                .unwrap_or_default()
+            let source = self.controller.code.source();
+            drawn_units(&source.file, &source.text, Bodies::Blocks).unwrap_or_default()
         })
     }
 

@@ -14,7 +14,6 @@ use serde_json::Value;
 use understudy_cluster::Controller;
 use understudy_journal::source_word;
 use understudy_journal::{TimeOfDay, TimesOfDay};
-use understudy_ladder::Program;
 use understudy_parity::reconstruct;
 use understudy_remote_io::Missing;
 use understudy_text::spelling::suggestion;
@@ -25,7 +24,7 @@ use crate::describe::missing_text;
 use crate::error::ViewError;
 use crate::history::{Driven, History, Step};
 use crate::model::Model;
-use crate::value::{forced_point, forced_value, named, named_text, value_in};
+use crate::value::{forced_point, forced_value, has_numbers, named, named_text, value_in};
 use explain::Explainer;
 
 /// Why an output or a variable of a program has its value.
@@ -63,10 +62,10 @@ pub struct Why {
     pub scanned: Option<Value>,
     /// The inputs that were sampled in this cycle, by name.
     pub inputs: BTreeMap<String, Value>,
-    /// The same as people read them, of a program with numbers.
+    /// The same as people read them, of a program with points that are numbers.
     #[serde(skip)]
     pub inputs_text: Option<String>,
-    /// Type of the signal, of a program with numbers.
+    /// Type of the signal.
     #[serde(
         rename = "type",
         skip_serializing_if = "Option::is_none",
@@ -247,22 +246,25 @@ impl Model {
         let driven = drives.and_then(|driven| Some(value_in(output?, &driven.outputs)));
         let unforced = drives.and_then(|driven| Some(value_in(output?, &driven.unforced)));
         let typed = controller.code.typed();
-        let text = controller.code.source_text();
         // What is held may have been proved by another program, before an online change.
         let stopped = missing == Some(Missing::ProgramFault);
         let failed = if stopped { history.fault_before(place) } else { None };
         let explained_by = self.version_at(history, failed.or(explained).unwrap_or(place))?;
         let code = &explained_by.controller().code;
+        let part = code.typed().part(name);
         let because = match (code.ladder(), explained_by.text()) {
-            (Some(ladder), _) => explained
-                .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
+            (Some(ladder), _) => part
+                .zip(explained)
+                .map(|(part, explained)| {
+                    Explainer::new(self, history, ladder).root(&part, explained)
+                })
                 .transpose()?,
             (None, None) => None,
             (None, Some(text)) => {
                 let typed = code.typed();
                 let mut explainer = statements::Explainer::new(self, history, typed, text);
                 let value = unforced.clone().unwrap_or_default();
-                match (failed, explained, typed.part(name)) {
+                match (failed, explained, part) {
                     (Some(_), ..) => explainer.fault(name, value, place),
                     (None, Some(explained), Some(part)) => Some(explainer.root(&part, explained)?),
                     _ => None,
@@ -276,7 +278,8 @@ impl Model {
             driven.or(because.as_ref().map(|reason| reason.value.clone())).unwrap_or_default();
         let sampled = step.sampled.as_ref().into_iter();
         let inputs = sampled.clone().flat_map(|it| named(&controller.interface.inputs, &it.inputs));
-        let mut sampled = sampled.filter(|_| text.is_some());
+        let has_numbers = has_numbers(controller);
+        let mut sampled = sampled.filter(|_| has_numbers);
         Ok(Why {
             at: None,
             signal: name.to_owned(),
@@ -293,10 +296,10 @@ impl Model {
             inputs_text: sampled
                 .next()
                 .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
-            of: text.and_then(|_| match output {
+            of: match output {
                 Some(output) => Some(output.declared()),
-                None => typed.part(name)?.declared(),
-            }),
+                None => typed.part(name).and_then(|part| part.declared()),
+            },
             ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: decided.and_then(|driven| self.reconstructed(program, step, driven)),
@@ -330,7 +333,7 @@ impl Model {
         })
     }
 
-    /// The program and the name of an output or a memory bit, as in a cycle or in the newest one.
+    /// The program and the name of an output, a variable or a part of one, as in a cycle or in the newest one.
     fn find_signal(
         &self,
         asked: &str,
@@ -342,33 +345,26 @@ impl Model {
         let mut found = Vec::new();
         let mut known = Vec::new();
         for (place, controller) in controllers.iter().enumerate() {
+            let program = ProgramId(place as u8);
             let prefix = format!("{}.", controller.name);
             let name = asked.strip_prefix(&prefix).unwrap_or(asked);
-            for signal in controller.ladder().into_iter().flat_map(Program::writable) {
-                known.push(signal.name.to_string());
-                let address = signal.address.as_ref().map(ToString::to_string);
-                if signal.name.as_str() == name || address.as_deref() == Some(name) {
-                    let program = ProgramId(place as u8);
-                    found.push((program, signal.name.to_string(), name != asked));
-                }
-            }
-        }
-        for (place, controller) in controllers.iter().enumerate() {
-            if controller.ladder().is_some() {
-                continue;
-            }
+            let is_named = name != asked;
             let typed = controller.code.typed();
-            let prefix = format!("{}.", controller.name);
-            let name = asked.strip_prefix(&prefix).unwrap_or(asked);
             known.extend(typed.variables.iter().map(|it| it.name.clone()));
             let part = typed.part(name).filter(|it| it.of.elementary().is_some());
             let point = typed.outputs.find(name).map(|point| point.name.clone());
-            if let Some(name) = point.or(part.map(|part| part.name)) {
-                found.push((ProgramId(place as u8), name, asked.starts_with(&prefix)));
-            }
+            let name = point.or(part.map(|part| part.name));
+            found.extend(name.map(|name| (program, name, is_named)));
         }
         if found.iter().any(|(_, _, named)| *named) {
             found.retain(|(_, _, named)| *named);
+        }
+        // An input is that of its program where no other one computes a signal of its name.
+        let is_computed = |(program, name, _): &(ProgramId, String, bool)| {
+            controllers[program.index()].interface.inputs.find(name).is_none()
+        };
+        if found.iter().any(is_computed) {
+            found.retain(is_computed);
         }
         match found.as_slice() {
             [] => Err(ViewError::NoOutput {
@@ -412,8 +408,9 @@ impl Model {
             outputs.flat_map(|outputs| named(outputs, image)).collect()
         };
         let values_text = |program: ProgramId, image: &Image| {
-            self.cluster.controllers()[program.index()].code.source_text()?;
-            Some(named_text(outputs_of(program, image)?, image))
+            let controller = &self.cluster.controllers()[program.index()];
+            let outputs = outputs_of(program, image).filter(|_| has_numbers(controller))?;
+            Some(named_text(outputs, image))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;

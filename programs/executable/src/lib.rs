@@ -60,6 +60,11 @@ impl Executable {
         self.retentive.is_some()
     }
 
+    /// The bits of the state that are kept over a restart, packed; nothing where none is.
+    pub fn retained(&self) -> Option<&[u64]> {
+        self.retentive.as_deref()
+    }
+
     /// The state of a warm start: the initial state with the retentive parts of `state`, packed as `state`. A program fault is not among them.
     pub fn restarted(&self, state: &[u64]) -> Vec<u64> {
         let mut restarted = self.initial().to_vec();

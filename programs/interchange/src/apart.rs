@@ -13,7 +13,6 @@ use understudy_text::{Diagnostic, Severity, has_errors};
 use crate::format::Format;
 use crate::plcopen;
 use crate::source::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
-use crate::twincat;
 use crate::typed_text::{Bodies, parsed, typed_text_with};
 use crate::written::{WriteError, Written, write};
 
@@ -134,19 +133,14 @@ impl Text<'_> {
     ) -> (Apart, bool) {
         let Self { name, text, parsed } = self;
         let has_event = parsed.as_ref().is_some_and(|file| has_event(file, program));
-        let is_document =
-            Format::of(name, text) == Some(Format::PlcOpen) && twincat::read(text).is_none();
-        let ladder = rungs.and_then(Rungs::written);
-        let to = match &ladder {
-            // A ladder states neither interval nor event.
-            Some(_) if period.is_none() && !has_event => Format::Ladder,
-            Some(_) if is_document => Format::PlcOpen,
-            _ => Format::StructuredText,
-        };
+        // A ladder states neither interval nor event.
+        let is_plain = period.is_none() && !has_event;
+        let ladder = rungs.and_then(Rungs::written).filter(|_| is_plain);
+        let to = if ladder.is_some() { Format::Ladder } else { Format::StructuredText };
         let wanted = Wanted { program, period: None };
         let written = match &ladder {
-            Some(ladder) if to == Format::Ladder => write(to, ladder, None),
-            _ => match typed_text_with(name, text, wanted, (to, Bodies::AsRead), None) {
+            Some(ladder) => write(to, ladder, None),
+            None => match typed_text_with(name, text, wanted, (to, Bodies::AsRead), None) {
                 Ok((Some(written), _)) => Ok(written),
                 Ok((None, _)) => Err(WriteError::NotHeld("it has errors".to_owned())),
                 Err(error) => Err(error),

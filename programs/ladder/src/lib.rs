@@ -45,7 +45,7 @@ pub use parser::{
 };
 pub use print::print;
 pub use program::{
-    Address, Area, Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Element,
-    Feed, Name, Program, Relation, Rung, Series, Signal, visit,
+    Address, Area, Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Cost,
+    Element, Feed, Name, Program, Relation, Rung, Series, Signal, visit,
 };
 pub use structured_text::{circuit_as_structured_text, edge_names, standard_time, structured_text};

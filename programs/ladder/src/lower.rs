@@ -8,7 +8,7 @@
 
 mod writes;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -174,7 +174,8 @@ impl Program {
     fn typed_without_check(&self, period: Duration) -> Result<Typed, LowerError> {
         let written = Written::new(self, period, false);
         let mut typed = of_text(self, &written, period)?;
-        let names = written.names.into_iter().chain(written.edges).collect();
+        let names: HashMap<String, String> =
+            written.names.into_iter().chain(written.edges).collect();
         typed.rename(&names);
         typed.inputs.put_first(self.inputs.iter().map(|signal| signal.name.as_str()));
         typed.outputs.put_first(self.outputs.iter().map(|signal| signal.name.as_str()));
@@ -182,6 +183,13 @@ impl Program {
         let signals = self.inputs.iter().chain(self.writable());
         let about: HashMap<&str, Option<&String>> =
             signals.map(|signal| (signal.name.as_str(), signal.description.as_ref())).collect();
+        // What holds an expression between two statements was declared by no person.
+        let own: HashSet<&str> = names.values().map(String::as_str).collect();
+        let (known, held): (Vec<_>, Vec<_>) = std::mem::take(&mut typed.variables)
+            .into_iter()
+            .partition(|variable| own.contains(variable.name.as_str()));
+        typed.hidden.extend(held);
+        typed.variables = known;
         for variable in &mut typed.variables {
             variable.description = about.get(variable.name.as_str()).copied().flatten().cloned();
         }

@@ -14,9 +14,7 @@ use understudy_typed::{Machine, Point, Program as Typed, Scratch};
 use crate::flow::{ElementFlow, Evaluation, Reading, RungFlow};
 use crate::lower::{LowerError, of_text, validate};
 use crate::names::StandardNames;
-use crate::program::{
-    Block, BlockKind, Coil, CoilKind, ContactKind, Element, Program, Rung, Series, Signal,
-};
+use crate::program::{Block, Coil, CoilKind, ContactKind, Element, Program, Rung, Series, Signal};
 use crate::structured_text::Written;
 
 /// A program that keeps what its elements read.
@@ -149,13 +147,8 @@ impl Flow<'_> {
         }
         let output = self.bit();
         let reading = match block.kind {
-            BlockKind::Tof(preset) if !output => {
-                // It is over, or has not run yet.
-                self.next();
-                Reading::Time(preset)
-            }
             kind if kind.preset_time().is_some() => {
-                Reading::Time(Duration::from_nanos(self.next()))
+                Reading::Time(kind.shown_time(Duration::from_nanos(self.next()), output))
             }
             kind if kind.preset_value().is_some() => {
                 Reading::Number(u16::try_from(self.next()).unwrap_or(u16::MAX))
@@ -174,12 +167,11 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// For a program that is scanned once a `period`. Its states are those of [`Program::lower`] with the same period.
+    /// For a program that is scanned once a `period`, with the layout of the states of its circuit for the same period.
     ///
     /// # Errors
     /// As [`Program::lower`].
-    pub fn new(program: &Program, period: Duration) -> Result<Self, LowerError> {
-        let layout = program.layout(period)?;
+    pub fn new(program: &Program, layout: Layout, period: Duration) -> Result<Self, LowerError> {
         Ok(Self { watched: Arc::new(Watched::new(program, period)?), layout })
     }
 

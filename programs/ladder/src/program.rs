@@ -8,7 +8,7 @@ mod name;
 
 use std::fmt;
 
-pub use block::{Block, BlockKind, Feed};
+pub use block::{Block, BlockKind, Cost, Feed};
 pub use name::Name;
 use understudy_text::words;
 pub use understudy_typed::Comparison as Relation;
@@ -233,6 +233,21 @@ impl Program {
             });
         }
         count
+    }
+}
+
+impl Rung {
+    /// What its contacts and comparisons read, in the order of the scan, and what it writes: its blocks, then the targets of its coils.
+    pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
+        let (mut read, mut written) = (Vec::new(), Vec::new());
+        visit(&self.network, &mut |element| match element {
+            Element::Contact(contact) => read.push(contact.operand.as_str()),
+            Element::Comparison(comparison) => read.push(comparison.counter.as_str()),
+            Element::Block(block) => written.push(block.name.as_str()),
+            Element::Branches(_) => {}
+        });
+        written.extend(self.coils.iter().map(|coil| coil.target.as_str()));
+        (read, written)
     }
 }
 

@@ -15,6 +15,7 @@ mod chains;
 mod connections;
 mod constants;
 mod convert;
+mod details;
 mod elements;
 mod expand;
 mod expressions;
@@ -23,7 +24,6 @@ mod fold;
 mod idle;
 mod images;
 mod initial;
-mod long;
 mod names;
 mod numbers;
 mod places;
@@ -117,7 +117,7 @@ pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
     }
     lowering.declare(file, library);
     let checked = lowering.programs(file, options);
-    long::mark(&mut lowering.program, file);
+    lowering.mark_details(file);
     lowering.finish(checked)
 }
 
@@ -148,6 +148,8 @@ struct Lowering<'a> {
     interfaces: HashSet<String>,
     /// By the ids of the program's structures.
     structures: Vec<Rc<StructureInfo>>,
+    /// Subranges of variables that people see, by name.
+    ranges: HashMap<String, (i128, i128)>,
     /// Values of enumerations by their names.
     enumerators: HashMap<String, Vec<(EnumerationId, Elementary, i64)>>,
     globals: HashMap<String, Symbol>,
@@ -220,6 +222,7 @@ impl<'a> Lowering<'a> {
             types: HashMap::new(),
             interfaces: file.interfaces.iter().map(Name::key).collect(),
             structures: Vec::new(),
+            ranges: HashMap::new(),
             enumerators: HashMap::new(),
             globals: HashMap::new(),
             global_declarations: HashMap::new(),

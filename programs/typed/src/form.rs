@@ -6,7 +6,7 @@
 //!
 //! The first slots of the state are the program's own: [`Program::HEADER`].
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -54,6 +54,18 @@ pub struct Program {
     pub initial: Vec<Initial>,
     /// Slots of retentive variables, in order and apart; see [`Program::retain`].
     pub retained: Vec<Range<u32>>,
+    /// What the declarations of variables and of parts of them say besides their types, by names with `[]` for all indices: `recipe[].pause`. No scan
+    /// depends on it.
+    pub details: BTreeMap<String, Detail>,
+}
+
+/// What a declaration says besides the type.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Detail {
+    /// The least and the greatest value of a subrange.
+    pub range: Option<(i128, i128)>,
+    /// It is declared as LTIME, LDATE and the like.
+    pub is_long: bool,
 }
 
 impl Program {

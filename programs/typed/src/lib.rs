@@ -34,8 +34,9 @@ pub use self::cost::Cost;
 pub use self::edges::EdgeMemory;
 pub use self::fault::{Cause, Fault};
 pub use self::form::{
-    Argument, Branch, Call, Case, Expression, ExpressionKind, For, Index, Initial, Place, Program,
-    Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Timer, Variable,
+    Argument, Branch, Call, Case, Detail, Expression, ExpressionKind, For, Index, Initial, Place,
+    Program, Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Timer,
+    Variable,
 };
 pub use self::image::{Declared, Point, Points};
 pub use self::interpreter::{Done, Effect, Interpreter, Made, Read, Trace};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::form::{Program, Variable};
+use crate::form::{Detail, Program, Variable};
 use crate::image::Declared;
 use crate::operation::{number_text, text_literal};
 use crate::types::{Array, Elementary, Enumeration, Type};
@@ -27,6 +27,8 @@ pub struct Part {
     pub of: Type,
     /// The names of its values, where its type is an enumeration.
     pub values: Option<Arc<Enumeration>>,
+    /// What its declaration says besides its type.
+    pub detail: Detail,
     /// Its place in memory: 64 · slot + bit.
     pub address: u64,
 }
@@ -34,7 +36,8 @@ pub struct Part {
 impl Part {
     /// How its value is declared; nothing where it has parts, or is a text.
     pub fn declared(&self) -> Option<Declared> {
-        Some(Declared { values: self.values.clone(), ..self.of.elementary()?.into() })
+        let Detail { range, is_long } = self.detail;
+        Some(Declared { of: self.of.elementary()?, range, values: self.values.clone(), is_long })
     }
 
     /// The value in a state as it is written in IEC 61131-3; nothing where it has parts, or where the state ends before it.
@@ -96,7 +99,21 @@ impl Program {
     }
 
     fn new_part(&self, name: String, of: Type, address: u64) -> Part {
-        Part { values: self.values_of(&of), name, of, address }
+        Part { values: self.values_of(&of), detail: self.detail(&name), name, of, address }
+    }
+
+    /// What the declaration of a variable or of a part says besides the type.
+    fn detail(&self, name: &str) -> Detail {
+        if self.details.is_empty() {
+            return Detail::default();
+        }
+        let mut pieces = name.split('[');
+        let mut key = pieces.next().unwrap_or_default().to_owned();
+        for piece in pieces {
+            let (_, rest) = piece.split_once(']').unwrap_or_default();
+            key = key + "[]" + rest;
+        }
+        self.details.get(&key).copied().unwrap_or_default()
     }
 
     /// A type as it is written; `a structure` and `an enumeration of INT` where it has no name.

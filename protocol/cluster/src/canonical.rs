@@ -82,6 +82,7 @@ pub(crate) fn typed_text(program: &TypedProgram) -> String {
         frames,
         initial,
         retained,
+        details: _,
     } = program;
     // A program that keeps nothing has the text that it always had.
     let kept = match retained.is_empty() {

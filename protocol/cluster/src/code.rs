@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use understudy_bits::{Exact, Inexact, Layout, exact};
 use understudy_executable::{Executable, Interface};
-use understudy_ladder::{Executed, LowerError, Program as LadderProgram};
-use understudy_logic::Circuit;
+use understudy_ladder::{Executed, LowerError, Observer, Program as LadderProgram};
+use understudy_logic::{Circuit, Register};
 use understudy_typed::{
-    CarriedPath, CarriedState, EdgeMemory, Fate, Program as TypedProgram, Renamed, Successor, Told,
-    is_within,
+    CarriedPath, CarriedState, EdgeMemory, Elementary, Fate, Program as TypedProgram, Renamed,
+    Successor, Told, is_within,
 };
 use understudy_wire::ProgramHash;
 
@@ -61,15 +61,18 @@ struct Rungs {
 }
 
 impl Code {
-    /// The program of a ladder, for the period of the cluster.
+    /// The program of a file, for the period of the cluster, with the rungs that it is written in, of one that is.
     ///
     /// # Errors
-    /// A ladder that is too large for a circuit.
-    pub fn of_ladder(
+    /// Rungs that are too large for a circuit.
+    pub fn of(
         typed: Arc<TypedProgram>,
-        ladder: LadderProgram,
+        ladder: Option<LadderProgram>,
         source: Arc<SourceText>,
     ) -> Result<Self, LowerError> {
+        let Some(ladder) = ladder else {
+            return Ok(Self { typed, source, body: Body::Text });
+        };
         let Executed { circuit, kept } = Executed::new(&typed, &ladder)?;
         let circuit = circuit.named(ladder.name.as_str());
         let Exact { circuit: kept, layout, .. } = kept;
@@ -77,11 +80,6 @@ impl Code {
         let executable = Executable::from(&kept).keeping(retentive.clone());
         let rungs = Rungs { ladder, circuit, kept, executable, layout, retentive };
         Ok(Self { typed, source, body: Body::Rungs(Box::new(rungs)) })
-    }
-
-    /// A program of a text.
-    pub fn of_text(typed: Arc<TypedProgram>, source: Arc<SourceText>) -> Self {
-        Self { typed, source, body: Body::Text }
     }
 
     /// The same program, after one in which some paths had other names.
@@ -109,6 +107,21 @@ impl Code {
         }
     }
 
+    /// The observer of the power in its rungs, of one that is written in them.
+    pub fn observer(&self) -> Option<Observer> {
+        match &self.body {
+            Body::Rungs(rungs) => {
+                Observer::new(&rungs.ladder, rungs.layout.clone(), self.source.period).ok()
+            }
+            Body::Text => None,
+        }
+    }
+
+    /// The registers that have the names of its signals in a state as stations hold it; none where the state is the memory of its variables.
+    pub fn registers(&self) -> &[Register] {
+        self.circuit().map_or(&[], Circuit::registers)
+    }
+
     /// The circuit of one that is written in rungs: its registers are the first ones of a state, behind which stand signals that no scan reads.
     pub fn circuit(&self) -> Option<&Circuit> {
         match &self.body {
@@ -128,11 +141,18 @@ impl Code {
         }
     }
 
-    /// The text of its file, of one that is written in statements, charts and networks.
-    pub fn source_text(&self) -> Option<&Arc<str>> {
+    /// The bit of a state, as stations hold it, that a BOOL of the program is; none where no state has it.
+    pub fn bit_of(&self, path: &str) -> Option<usize> {
         match &self.body {
-            Body::Rungs(..) => None,
-            Body::Text => Some(&self.source.text),
+            Body::Rungs(rungs) => {
+                let mut registers = rungs.kept.registers().iter();
+                registers.position(|register| register.name == path)
+            }
+            Body::Text => {
+                let part = self.typed.part(path)?;
+                let is_bit = part.of.elementary() == Some(Elementary::Bool);
+                usize::try_from(part.address).ok().filter(|_| is_bit)
+            }
         }
     }
 
@@ -207,6 +227,14 @@ impl Code {
             }
         }
         paths
+    }
+
+    /// A variable whose value becomes, in an online change from the program before it, the nearest one that the circuit of this one has; only circuits
+    /// lack values.
+    pub(crate) fn nearest(&self, before: &Self) -> Option<String> {
+        self.layout()?;
+        let narrowed = self.fates(before).into_iter().find(|path| path.fate == Fate::Narrowed);
+        narrowed.map(|path| path.path)
     }
 
     /// Whether the states that stations hold have any of what a path stands for.

@@ -37,11 +37,11 @@ impl Cluster {
 
     /// The generated parity controller, on the first registers of the states that stations hold.
     fn generated(&self) -> Option<understudy_node::Generated> {
-        let circuits = self.controllers.iter().map(|controller| controller.code.circuit());
-        let widths = circuits.map(|circuit| Some(circuit?.registers().len()));
+        let parity = self.parity.as_ref()?;
+        let widths = parity.summands().iter().map(|summand| summand.registers.len());
         Some(understudy_node::Generated {
-            executable: self.parity.as_ref()?.circuit().into(),
-            widths: widths.collect::<Option<_>>()?,
+            executable: parity.circuit().into(),
+            widths: widths.collect(),
         })
     }
 

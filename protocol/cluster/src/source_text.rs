@@ -35,6 +35,11 @@ pub(crate) struct ReadSource {
 }
 
 impl SourceText {
+    /// The text of a file, for one period.
+    pub fn of(file: &str, text: &str, period: Duration) -> Self {
+        Self { file: file.to_owned(), text: Arc::from(text), period, renamed: Vec::new() }
+    }
+
     pub(crate) fn read(&self) -> ReadSource {
         let wanted = Wanted { period: Some(self.period), program: None };
         let SourceFile { source, rungs, diagnostics, .. } =
@@ -67,12 +72,9 @@ impl ReadSource {
         name: &str,
     ) -> Option<Result<Code, LowerError>> {
         let typed = Arc::clone(self.program.as_ref()?);
-        let Some(ladder) = &self.ladder else {
-            return Some(Ok(Code::of_text(typed, source)));
-        };
-        let mut ladder = ladder.clone();
-        ladder.name = name.into();
-        Some(Code::of_ladder(typed, ladder, source))
+        let ladder = self.ladder.clone();
+        let named = |ladder| Ladder { name: name.into(), ..ladder };
+        Some(Code::of(typed, ladder.map(named), source))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a program takes over in an online change, for proofs about it.
 
 use understudy_executable::Scratch;
-use understudy_typed::{Fate, Origin};
+use understudy_typed::Origin;
 
 use crate::code::Code;
 
@@ -23,9 +23,7 @@ pub fn states_at_change(before: &Code, after: &Code, state: &[u64]) -> [Vec<u64>
 
 /// A variable whose value becomes the nearest one that the circuit of the program after the change has; only circuits lack values.
 pub fn nearest_of(before: &Code, after: &Code) -> Option<String> {
-    let mut fates = after.fates(before).into_iter();
-    let narrowed = fates.find(|path| path.fate == Fate::Narrowed);
-    narrowed.filter(|_| after.ladder().is_some()).map(|path| path.path)
+    after.nearest(before)
 }
 
 impl Code {

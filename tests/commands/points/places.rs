@@ -15,15 +15,6 @@ use crate::understudy_in;
 /// A cycle of the run in which every input has the value that the operator has written.
 const CYCLE: i64 = 20;
 
-/// The value of a point for a program that reads it.
-fn told(row: &Row) -> Value {
-    match row.of {
-        "BOOL" => Value::Bool(row.number != 0),
-        _ if row.is_text() => row.shown.into(),
-        _ => row.number.into(),
-    }
-}
-
 /// Every place has the type of the declaration, the name of the author, and the value of its type.
 pub(super) fn at_every_place(folder: &Path, program: &str) {
     on_the_terminal(folder, program);
@@ -47,7 +38,7 @@ fn on_the_terminal(folder: &Path, program: &str) {
     let metrics = run(folder, &["gateway", "metrics", "runs/latest", "--once"]);
     for row in &POINTS {
         for name in [row.name.to_owned(), format!("q{}", row.name)] {
-            assert_eq!(state["values"][&name], told(row), "{program} {name}");
+            assert_eq!(state["values"][&name], row.told(), "{program} {name}");
         }
         let alarm = alarm_of(&top["result"]["process_alarms"], row);
         assert_eq!(alarm["active"], state_of(row) == "unacknowledged", "{program}: {alarm}");
@@ -93,7 +84,7 @@ fn on_the_page(folder: &Path, program: &str) {
         let trends = page.get(&trends).json();
         for (place, row) in POINTS.iter().enumerate() {
             let (name, fact) = (format!("{before}{}", row.name), &points[place]);
-            let told = told(row);
+            let told = row.told();
             assert_eq!((&fact["name"], &fact["type"]), (&json!(name), &json!(row.of)), "{program}");
             let of_values = if row.of == "Mode" { json!(names) } else { Value::Null };
             assert_eq!(fact["values"], of_values, "{program} {name}");
@@ -127,11 +118,11 @@ fn on_the_page(folder: &Path, program: &str) {
         let mut operator = operator.as_array().expect("a list").iter();
         let operator = &operator.find(|input| input["name"] == row.name).expect("it")["operator"];
         let limits = [&operator["low"], &operator["high"]];
-        assert!(limits.contains(&&told(row)), "{program}: {operator}");
+        assert!(limits.contains(&&row.told()), "{program}: {operator}");
     }
     for row in &POINTS {
         let why = page.get(&format!("/api/why/0/q{}?cycle={CYCLE}", row.name)).json();
-        assert_eq!((&why["value"], &why["type"]), (&told(row), &json!(row.of)), "{program}");
+        assert_eq!((&why["value"], &why["type"]), (&row.told(), &json!(row.of)), "{program}");
         assert_eq!(alarm_of(&state["process_alarms"], row)["name"], format!("one.q{}", row.name));
         let events = page.get(&format!("/api/events?find={}", row.name)).json().to_string();
         let written = format!("writes {} to input {}: ", row.shown, row.name);

@@ -1,5 +1,6 @@
 //! A point of each kind of declaration, and a cluster that has them: the table of every place that shows a point.
 
+use serde_json::Value;
 use understudy_cluster::{Cluster, Overrides, TemplateFile, read_with_files};
 
 /// A point of each kind, in the order of the declarations.
@@ -82,6 +83,32 @@ impl Row {
     /// Whether views have its value as a text, and not as a number or a truth value.
     pub fn is_text(&self) -> bool {
         matches!(self.of, "DATE" | "Mode")
+    }
+
+    /// The value for a program that reads it.
+    pub fn told(&self) -> Value {
+        match self.of {
+            "BOOL" => (self.number != 0).into(),
+            _ if self.is_text() => self.shown.into(),
+            _ => self.number.into(),
+        }
+    }
+
+    /// The least value, which it has at first, as [`Self::told`] has it.
+    pub fn told_at_first(&self) -> Value {
+        let least = self.safe.replace('"', "");
+        match self.of {
+            "BOOL" => false.into(),
+            _ if self.is_text() => least.into(),
+            // A time of the table begins at 0.
+            _ => least.parse::<i64>().unwrap_or_default().into(),
+        }
+    }
+
+    /// The least value as every view of a run has it.
+    pub fn safe_shown(&self) -> String {
+        let least = self.safe.replace('"', "");
+        if self.is_bool() { "0".to_owned() } else { least }
     }
 
     /// Least and greatest value of the setpoint, as a cluster file has them: the value and the least one.

@@ -13,7 +13,7 @@ mod waiting;
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
-use understudy_ladder::{BlockKind, Element, Name, Program, Signal};
+use understudy_ladder::{Element, Name, Program, Signal};
 use understudy_logic::{Circuit, LANES, Lanes, Run, Scan, bit};
 
 use self::reference::{Joint, Reference, Seen};
@@ -67,10 +67,8 @@ fn freed(ladder: &HybridLadder) -> Program {
     program.outputs.extend(memory);
     for timer in ladder.timers.iter().flatten() {
         let pin = |pin: &str| Name::from(format!("{timer}.{pin}"));
-        let is_timer = |element: &Element| {
-            matches!(element, Element::Block(block)
-                if block.name == *timer && matches!(block.kind, BlockKind::Ton(_)))
-        };
+        let is_timer =
+            |element: &Element| matches!(element, Element::Block(block) if block.name == *timer);
         let ends = |rung: &understudy_ladder::Rung| rung.network.last().is_some_and(is_timer);
         let Some(place) = program.rungs.iter().position(ends) else {
             continue;

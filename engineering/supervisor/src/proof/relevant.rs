@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-use understudy_ladder::{Element, Name, Program, Rung, visit};
+use understudy_ladder::{Name, Program, Rung};
 
 use crate::ladder::{Correspondence, InputOutputMap};
 
@@ -42,21 +42,8 @@ pub(super) fn relevant<'p>(
 
 /// The names that a rung writes, and those that it reads; a pin of a block is the block.
 fn uses(rung: &Rung) -> (HashSet<&str>, HashSet<&str>) {
-    let mut written: HashSet<&str> = rung.coils.iter().map(|coil| coil.target.as_str()).collect();
-    let mut read = HashSet::new();
-    visit(&rung.network, &mut |element| match element {
-        Element::Contact(contact) => {
-            let name = contact.operand.as_str();
-            read.insert(name);
-            read.extend(name.rsplit_once('.').map(|(block, _)| block));
-        }
-        Element::Comparison(comparison) => {
-            read.insert(comparison.counter.as_str());
-        }
-        Element::Block(block) => {
-            written.insert(block.name.as_str());
-        }
-        Element::Branches(_) => {}
-    });
-    (written, read)
+    let (read, written) = rung.names();
+    let pins = read.iter().filter_map(|name| name.rsplit_once('.'));
+    let blocks: Vec<&str> = pins.map(|(block, _)| block).collect();
+    (written.into_iter().collect(), read.into_iter().chain(blocks).collect())
 }

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use understudy_ladder::{BlockKind, ContactKind, Element, Name, Program, Rung, Signal};
+use understudy_ladder::{ContactKind, Element, Name, Program, Rung, Signal};
 
 /// A timer that was replaced: the name of its output, now an input, and what it runs by.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,7 +31,8 @@ fn free(rung: &Rung) -> Option<FreeTimer> {
     let [Element::Contact(contact), Element::Block(block)] = rung.network.as_slice() else {
         return None;
     };
-    let is_timer = matches!(block.kind, BlockKind::Ton(_))
+    let is_timer = block.kind.preset_time().is_some()
+        && block.kind.needs_power()
         && contact.kind == ContactKind::NormallyOpen
         && rung.coils.is_empty();
     is_timer.then(|| FreeTimer {

@@ -6,7 +6,7 @@ use std::hash::{BuildHasher, Hasher};
 use understudy_cluster::{Cluster, InputSource, OperatorDeclaration, typed_value, value_text};
 use understudy_remote_io::{OperatorInputKind, ValueMismatch};
 use understudy_text::spelling::suggestion;
-use understudy_typed::Declared;
+use understudy_typed::{Declared, Elementary};
 use understudy_wire::{ForceError, Member, PointValue, Role, Write, WriteId, WriteRefusal};
 
 /// A write as a person or a program asks for it.
@@ -31,6 +31,8 @@ pub enum RequestedValue<'a> {
     Text(&'a str),
     /// As the input stores it.
     Stored(u64),
+    /// A whole number, as viewers have the value: of a TIME its nanoseconds.
+    Number(i64),
 }
 
 /// Reason why a text is not a write.
@@ -118,8 +120,15 @@ pub fn new_write(
     };
     let OperatorDeclaration { input: place, declared, .. } = operator;
     let of = declared.of;
-    let text = match request.value {
+    let requested = match request.value {
+        RequestedValue::Number(nanoseconds) if of == Elementary::Time => {
+            RequestedValue::Stored(nanoseconds as u64)
+        }
+        requested => requested,
+    };
+    let text = match requested {
         RequestedValue::Text(text) => text.trim().to_owned(),
+        RequestedValue::Number(number) => number.to_string(),
         RequestedValue::Stored(stored) => value_text(declared, stored),
     };
     let invalid = |help: String| WriteProblem::Value {
@@ -127,8 +136,10 @@ pub fn new_write(
         text: text.chars().take(60).collect(),
         help,
     };
-    let stored = match request.value {
-        RequestedValue::Text(_) => typed_value(&text, declared).map_err(invalid)?,
+    let stored = match requested {
+        RequestedValue::Text(_) | RequestedValue::Number(_) => {
+            typed_value(&text, declared).map_err(invalid)?
+        }
         RequestedValue::Stored(stored) if declared.has(declared.limited(stored)) => stored,
         RequestedValue::Stored(_) => {
             return Err(invalid(format!("the input is {declared}, which does not have it")));

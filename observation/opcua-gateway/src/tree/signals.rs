@@ -2,7 +2,6 @@
 
 use opcua::types::Variant;
 use understudy_cluster::{Controller, InputSource};
-use understudy_logic::Circuit;
 use understudy_remote_io::OperatorInputKind;
 use understudy_typed::{Elementary, Point};
 use understudy_view::stored;
@@ -62,7 +61,7 @@ impl Tree {
             }
         }
         self.enter(&["Programs", &controller.name, "Markers"]);
-        let registers = controller.circuit().map_or(&[][..], Circuit::registers);
+        let registers = controller.code.registers();
         let names: Vec<&str> = registers.iter().map(|register| register.name.as_str()).collect();
         for word in words(&names) {
             let (kind, bits) = (word.kind, word.bits);

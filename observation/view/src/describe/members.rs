@@ -12,7 +12,7 @@ use understudy_wire::{
     Configurations, Member, Moment, Part, ProgramSet, SignalPlace, StationId, StationSet, Word,
 };
 
-use super::signals::Names;
+use super::signals::{Names, image_text};
 use super::{Words, list, program_name, programs, source_text, stations};
 use crate::protection::{asked_because, old_inputs_text};
 
@@ -196,9 +196,9 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         format!("{} is no longer forced: removed by the operator", members.place(*signal));
 }
 
-descriptions! { plant: PlantEvent, members: Members;
+descriptions! { plant: PlantEvent, members: Names<'_>;
     Stepped { field, .. } => "stepped" Info
-        format!("sensors {}, {} parts finished", field.sensors, field.finished);
+        format!("sensors {}, {} parts finished", members.inputs(&field.sensors), field.finished);
     Refused { member, theirs, ours } => "refused" Alarm refused_text(*member, theirs, ours, members);
     RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
 }
@@ -208,8 +208,15 @@ fn name(station: StationId, members: &Members) -> &str {
 }
 
 fn words_text(words: &[Word], members: &Members) -> String {
-    let words = words.iter();
-    let words = words.map(|word| format!("{} {}", programs(word.mask, members), word.sum));
+    let words = words.iter().map(|word| {
+        let mut programs_of_it = word.mask.iter();
+        // The word of one program is its outputs; a sum of several has no types.
+        let sum = match (programs_of_it.next(), programs_of_it.next()) {
+            (Some(only), None) => image_text(&word.sum, members.outputs(only)),
+            _ => word.sum.to_string(),
+        };
+        format!("{} {sum}", programs(word.mask, members))
+    });
     list(&words.collect::<Vec<_>>())
 }
 

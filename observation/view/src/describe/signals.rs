@@ -6,7 +6,7 @@ use std::ops::Deref;
 use understudy_journal::{Cycles, Happening, Members, NamedSignal, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_typed::{Declared, Elementary};
-use understudy_wire::{Force, Image, Member, PointValue, SignalPlace, Write, WriteId};
+use understudy_wire::{Force, Image, Member, PointValue, ProgramId, SignalPlace, Write, WriteId};
 
 use crate::value::{is_declared, stored_text};
 
@@ -33,7 +33,7 @@ impl Writes {
     }
 }
 
-/// The names that the events of a remote I/O need.
+/// The names that the events of a remote I/O or a plant need.
 pub(super) struct Names<'a> {
     pub(super) members: &'a Members,
     pub(super) writes: &'a Writes,
@@ -79,17 +79,25 @@ impl Names<'_> {
         }
     }
 
-    /// The image of all inputs of the reporting remote I/O.
+    /// The program whose inputs and outputs the reporting member has.
+    fn program(&self) -> Option<ProgramId> {
+        match self.by? {
+            Member::Plant(program) => Some(program),
+            by => by.sampled_program(),
+        }
+    }
+
+    /// The image of all inputs of its program.
     pub(super) fn inputs(&self, image: &Image) -> String {
-        match self.by.and_then(Member::sampled_program) {
+        match self.program() {
             Some(program) => image_text(image, self.members.inputs(program)),
             None => image.to_string(),
         }
     }
 
-    /// The image of all its outputs.
+    /// The image of all outputs of its program.
     pub(super) fn outputs(&self, image: &Image) -> String {
-        match self.by.and_then(Member::sampled_program) {
+        match self.program() {
             Some(program) => image_text(image, self.members.outputs(program)),
             None => image.to_string(),
         }
@@ -104,7 +112,10 @@ impl Names<'_> {
 }
 
 /// The values by name where one of them is a number, else the bits.
-fn image_text<'a>(image: &Image, signals: impl Iterator<Item = &'a NamedSignal>) -> String {
+pub(super) fn image_text<'a>(
+    image: &Image,
+    signals: impl Iterator<Item = &'a NamedSignal>,
+) -> String {
     let signals: Vec<&NamedSignal> = signals.collect();
     let end = |signal: &&NamedSignal| {
         u32::from(signal.place.first_bit()) + signal.declared.of.bits() <= image.width() as u32

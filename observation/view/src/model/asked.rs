@@ -5,7 +5,7 @@ use std::sync::Arc;
 use understudy_cluster::{Cluster, Controller};
 use understudy_journal::{Members, SourceCounts, TimeOfDay};
 use understudy_ladder::Evaluation;
-use understudy_typed::{Interpreter, Trace};
+use understudy_typed::Trace;
 use understudy_wire::{Member, Moment, ProgramId, StationId};
 
 use super::{Counters, Model, SentTurn};
@@ -164,9 +164,8 @@ impl Model {
         place: usize,
     ) -> Result<Evaluation, ViewError> {
         let sampled = self.sampled_at(history, place)?;
-        let period = self.cluster.agreement().schedule.period();
         let version = self.version_at(history, place)?;
-        let observer = version.observer(period).ok_or_else(|| ViewError::NoState {
+        let observer = version.observer().ok_or_else(|| ViewError::NoState {
             cycle: history.steps()[place].cycle,
             program: self.program_name(history.program()).to_owned(),
             reason: "only a ladder has a power flow".to_owned(),
@@ -174,10 +173,10 @@ impl Model {
         Ok(observer.evaluate(sampled.state.words(), sampled.inputs.words()))
     }
 
-    /// The scan of a program with numbers in a cycle, statement by statement.
+    /// The scan of a program in a cycle, statement by statement.
     ///
     /// # Errors
-    /// Where the cycle or the state is not known, or the program is Boolean.
+    /// Where the cycle or the state is not known.
     pub fn trace(&self, program: ProgramId, cycle: i64) -> Result<Trace, ViewError> {
         let history = self.history_of(program)?;
         let place = history.place_of(cycle).ok_or_else(|| self.no_cycle(program, cycle))?;
@@ -185,23 +184,22 @@ impl Model {
     }
 
     pub(crate) fn trace_at(&self, history: &History, place: usize) -> Result<Trace, ViewError> {
-        let sampled = self.sampled_at(history, place)?;
-        let interpreter = self.interpreter_of(history, place)?;
-        Ok(interpreter.trace(sampled.state.words(), sampled.inputs.words()))
+        let (version, state) = self.typed_state_at(history, place)?;
+        let inputs = self.sampled_at(history, place)?.inputs.words();
+        Ok(version.interpreter().trace(&state, inputs))
     }
 
-    /// The interpreter of a program with numbers.
-    pub(crate) fn interpreter_of(
+    /// The program that took the sample of a step, and x(t) in the order of its variables.
+    pub(crate) fn typed_state_at(
         &self,
         history: &History,
         place: usize,
-    ) -> Result<&Interpreter, ViewError> {
-        let interpreter = self.version_at(history, place)?.interpreter();
-        interpreter.ok_or_else(|| ViewError::NoState {
-            cycle: history.steps()[place].cycle,
-            program: self.program_name(history.program()).to_owned(),
-            reason: "only a program with numbers has statements".to_owned(),
-        })
+    ) -> Result<(&Version, Vec<u64>), ViewError> {
+        let version = self.version_at(history, place)?;
+        let sampled = self.sampled_at(history, place)?;
+        let mut state = version.controller().code.typed_state(sampled.state.words()).into_owned();
+        state.resize(version.interpreter().state_words(), 0);
+        Ok((version, state))
     }
 
     /// The program that took the sample of a step, or that before it where it has none.

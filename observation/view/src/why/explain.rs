@@ -8,12 +8,14 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use understudy_ladder::{CoilKind, ContactKind, Element, Evaluation, Program, Reading};
+use understudy_typed::Part;
 
 use super::power::{Node, behind, nodes};
 use super::{Reason, end_of_history};
 use crate::error::ViewError;
 use crate::history::History;
 use crate::model::Model;
+use crate::value::shown;
 
 /// Reasons within reasons.
 const DEEPEST: usize = 24;
@@ -51,18 +53,37 @@ impl<'m> Explainer<'m> {
         }
     }
 
-    /// A signal as it was after the scan of the step at `place`.
-    pub(super) fn root(&mut self, name: &str, place: usize) -> Result<Reason, ViewError> {
+    /// A variable, or a part of one, as it was after the scan of the step at `place`.
+    pub(super) fn root(&mut self, part: &Part, place: usize) -> Result<Reason, ViewError> {
         let evaluation = self.model.evaluation_at(self.history, place)?;
+        let name = part.name.as_str();
         let of = |signals: &[understudy_ladder::Signal], values: &[bool]| {
             let found = signals.iter().position(|signal| signal.name.as_str() == name);
             found.and_then(|found| values.get(found).copied())
         };
         let value = of(&self.program.outputs, &evaluation.outputs)
             .or_else(|| of(&self.program.memory, &evaluation.memory))
-            .unwrap_or_default();
+            .or_else(|| of(&self.program.inputs, &evaluation.inputs));
         self.evaluations.insert(place, Some(Rc::new(evaluation)));
-        Ok(self.signal(name, value, place, self.program.rungs.len(), 0))
+        if let Some(value) = value {
+            return Ok(self.signal(name, value, place, self.program.rungs.len(), 0));
+        }
+        // A pin or the value of a block, or what sees an edge.
+        let state = self.model.state_after(self.history, place)?;
+        let block = name.rsplit_once('.').and_then(|(block, _)| {
+            let rung = self.rung_of(block)?;
+            self.block_at(block, rung, place, 1)
+        });
+        let text = if block.is_some() { "after the scan" } else { "no signal of a rung" };
+        let declared = part.declared();
+        let stored = part.stored(&state).zip(declared.as_ref());
+        let value = stored.map(|((_, stored), declared)| shown(declared, stored));
+        Ok(Reason {
+            value: value.unwrap_or_default(),
+            of: declared,
+            because: block.into_iter().collect(),
+            ..self.leaf(name, false, place, text)
+        })
     }
 
     fn evaluation(&mut self, place: usize) -> Option<Rc<Evaluation>> {
@@ -146,16 +167,12 @@ impl<'m> Explainer<'m> {
     /// The last step before the one at `place` whose scan changed a signal to `value`; the first step that is known where none did.
     fn changed(&self, name: &str, value: bool, place: usize) -> Result<usize, usize> {
         let version = self.model.version_at(self.history, place).map_err(|_| place)?;
-        let circuit = version.controller().circuit();
-        let register = circuit.and_then(|circuit| {
-            let mut registers = circuit.registers().iter();
-            registers.position(|register| register.name == name)
-        });
+        let bit = version.controller().code.bit_of(name);
         let mut at = place;
         loop {
             let before = self.history.scan_before(at).ok_or(at)?;
             let state = self.history.steps()[before].sampled.as_ref();
-            let was = register.and_then(|register| Some(state?.state.get(register)));
+            let was = bit.and_then(|bit| Some(state?.state.get(bit)));
             if was != Some(value) {
                 return Ok(before);
             }

@@ -1,6 +1,6 @@
 //! Which elements of a rung let power through, and which hold it back.
 
-use understudy_ladder::{Block, BlockKind, Element, ElementFlow, Series};
+use understudy_ladder::{Block, Element, ElementFlow, Series};
 
 /// An element with what the power did in it, and what is inside of it.
 pub(super) struct Node<'e> {
@@ -38,7 +38,7 @@ impl Node<'_> {
     /// Whether it may have power behind it that does not come to it: a block that is on without power at its wire, or branches with one.
     fn holds(&self) -> bool {
         match self.element {
-            Element::Block(block) => !matches!(block.kind, BlockKind::Ton(_) | BlockKind::RTrig),
+            Element::Block(block) => !block.kind.needs_power(),
             Element::Branches(_) => self.parts.iter().any(|branch| has_holder(branch)),
             Element::Contact(_) | Element::Comparison(_) => false,
         }

@@ -1,7 +1,9 @@
 //! Chains of reasons.
 
 use understudy_cluster::{Overrides, read_with};
+use understudy_scenarios::Scenario;
 use understudy_view::Reason;
+use understudy_wire::ProgramId;
 
 use crate::support::{KILL_EACH, cell, model, scenario};
 
@@ -56,7 +58,7 @@ fn what_is_not_there_is_said() {
         "move_don",
         None,
         "U0573",
-        "no program has an output `move_don`; did you mean `move_down`?",
+        "no program has an output or a variable `move_don`; did you mean `move_down`?",
     );
     check(
         "%QX0.0",
@@ -210,4 +212,33 @@ fn a_block_is_explained_by_the_input_that_decided() {
         let is_found = found.iter().any(|reason| reason.contains(wanted));
         assert_eq!(is_found, is_there, "{rungs} at {cycle}: {found:#?}");
     }
+}
+
+/// Rungs explain all that the program has: inputs, and pins and values of blocks too.
+#[test]
+fn each_variable_of_a_ladder_is_explained() {
+    let cluster = crate::support::example("assembly-cell");
+    let model = model(&cluster, &Scenario { cycles: 300, ..Scenario::default() }, 1);
+    let why = |signal: &str| model.why(signal, Some(200)).expect("known");
+    let input = why("cell.body_placed");
+    assert_eq!(input.of.map(|of| of.to_string()).as_deref(), Some("BOOL"));
+    let reason = input.because.expect("a reason");
+    assert!(reason.text.starts_with("input, since cycle "), "{}", reason.text);
+    let ladder = cluster.controllers()[0].ladder().expect("a ladder");
+    let signals: Vec<_> = ladder.blocks();
+    assert!(!signals.is_empty());
+    for block in signals {
+        for pin in block.kind.outputs().iter().copied().chain(block.kind.value_output()) {
+            let name = format!("{}.{pin}", block.name);
+            let found = why(&format!("cell.{name}"));
+            let state = model.state_signals(ProgramId(0));
+            let own: Vec<_> = state.into_iter().filter(|signal| signal.name == name).collect();
+            let value = model.state_values(ProgramId(0), 200, &own).expect("known");
+            assert_eq!([own[0].shown(value[0].clone())], [found.value], "{name}");
+            let block_reason = &found.because.expect("a reason").because[0];
+            assert!(block_reason.text.starts_with(block.kind.word()), "{}", block_reason.text);
+        }
+    }
+    // What one program computes is meant, where others read a signal of its name.
+    assert!(model.why("full", Some(200)).is_ok());
 }

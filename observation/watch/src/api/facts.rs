@@ -203,21 +203,13 @@ fn operator_facts(name: &str, declared: &OperatorDeclaration, role: Role) -> Opt
 }
 
 fn signal_facts(controller: &Controller, points: &Points) -> Vec<SignalFacts> {
-    let described = |name: &str| {
-        let ladder = controller.ladder()?;
-        let mut signals = ladder.inputs.iter().chain(&ladder.outputs);
-        let signal = signals.find(|signal| signal.name.as_str() == name)?;
-        let address = signal.address.as_ref().map(ToString::to_string);
-        Some((address, signal.description.clone()))
-    };
     let declared = |name: &str| {
         let mut variables = controller.code.typed().variables.iter();
         let variable = variables.find(|variable| variable.name == name)?;
         Some((variable.address.clone(), variable.description.clone()))
     };
     let facts = points.iter().map(|point| {
-        let known = described(&point.name).or_else(|| declared(&point.name));
-        let (address, comment) = known.unwrap_or_default();
+        let (address, comment) = declared(&point.name).unwrap_or_default();
         SignalFacts {
             name: point.name.clone(),
             of: point.declared().to_string(),

@@ -8,7 +8,7 @@ use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{Path, Query, State};
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Controller;
-use understudy_ladder::{Element, Program, Rung, draw_svg_rungs, visit};
+use understudy_ladder::{Program, draw_svg_rungs};
 use understudy_view::{ShownLine, ViewError};
 use understudy_wire::ProgramId;
 
@@ -213,31 +213,14 @@ fn found<'p>(program: &'p Program, find: &str) -> impl Iterator<Item = usize> + 
     rungs
         .filter(move |(_, rung)| {
             let title = rung.title.as_deref().unwrap_or_default().to_lowercase();
-            let names = names_in(rung);
-            let mut names = names.read.iter().chain(&names.written);
+            let (read, written) = rung.names();
+            let mut names = read.into_iter().chain(written);
             title.contains(&find)
-                || names.any(|name| name.to_lowercase().contains(&find) || named.contains(name))
+                || names.any(|name| {
+                    name.to_lowercase().contains(&find) || named.iter().any(|known| known == name)
+                })
         })
         .map(|(place, _)| place)
-}
-
-#[derive(Default)]
-struct NamesIn {
-    read: Vec<String>,
-    written: Vec<String>,
-}
-
-fn names_in(rung: &Rung) -> NamesIn {
-    let mut names = NamesIn::default();
-    visit(&rung.network, &mut |element| match element {
-        Element::Contact(contact) => names.read.push(contact.operand.to_string()),
-        Element::Comparison(comparison) => names.read.push(comparison.counter.to_string()),
-        Element::Block(block) => names.written.push(block.name.to_string()),
-        Element::Branches(_) => {}
-    });
-    let targets = rung.coils.iter().map(|coil| coil.target.to_string());
-    names.written.extend(targets);
-    names
 }
 
 #[derive(Debug, Serialize)]
@@ -270,9 +253,9 @@ pub(super) async fn cross_reference(
     };
     let (mut read, mut written) = (BTreeMap::new(), BTreeMap::new());
     for (place, rung) in ladder.rungs.iter().enumerate() {
-        let names = names_in(rung);
-        note(&mut read, names.read, place);
-        note(&mut written, names.written, place);
+        let (reads, writes) = rung.names();
+        note(&mut read, reads, place);
+        note(&mut written, writes, place);
     }
     let signals = ladder.inputs.iter().chain(ladder.writable());
     let lines = signals.map(|signal| {
@@ -302,9 +285,9 @@ fn uses(known: &Known, program: ProgramId) -> CrossReference {
     CrossReference { place: "line", signals: signals.collect() }
 }
 
-fn note(rungs: &mut BTreeMap<String, Vec<usize>>, names: Vec<String>, place: usize) {
+fn note(rungs: &mut BTreeMap<String, Vec<usize>>, names: Vec<&str>, place: usize) {
     for name in names {
-        let of_name = rungs.entry(name).or_default();
+        let of_name = rungs.entry(name.to_owned()).or_default();
         if of_name.last() != Some(&place) {
             of_name.push(place);
         }

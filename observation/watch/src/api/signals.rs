@@ -83,7 +83,7 @@ pub(super) fn identifiers(text: &str, most: usize) -> Answered<Vec<&str>> {
 pub(super) struct Listed {
     id: String,
     program: usize,
-    /// `memory`, `timer`, `counter` or `variable`.
+    /// `variable`, as opposed to `input` and `output` among the facts of the run.
     kind: &'static str,
     name: String,
     #[serde(rename = "type")]
@@ -111,7 +111,7 @@ pub(super) async fn signals(State(app): State<Arc<App>>) -> Answered<Json<Vec<Li
         signals.map(move |signal| Listed {
             id: format!("{}.state.{}", program.0, identified(&signal.name)),
             program: program.index(),
-            kind: signal.kind.word(),
+            kind: "variable",
             values: value_names(signal.values()),
             name: signal.name,
             of: signal.of,

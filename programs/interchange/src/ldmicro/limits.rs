@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::parse::{Counter, Element, Kind, Timer};
+use super::parse::{Counter, Element, Kind};
 
 /// How far a counter can be told from one that goes on: past the numbers that it is compared with, nothing sees its value.
 ///
@@ -36,7 +36,7 @@ fn find_limits(
             Kind::Calculate(_, to, left, right) => {
                 [to, left, right].into_iter().for_each(|name| see(limits, name, None))
             }
-            Kind::Timer(Timer::Retentive, name, _) => see(limits, name, None),
+            Kind::Retentive(name, _) => see(limits, name, None),
             Kind::Parallel(branches) => {
                 for branch in branches {
                     find_limits(branch, limits, directions);

@@ -41,7 +41,10 @@ pub(super) enum Kind {
     /// On where it is a short circuit.
     Wire(bool),
     Edge(Edge),
-    Timer(Timer, String, Duration),
+    /// A timer of the standard, by its name there.
+    Timer(&'static str, String, Duration),
+    /// A timer that keeps its time without power.
+    Retentive(String, Duration),
     Counter(Counter, String, i64),
     Reset(String),
     Move(String, String),
@@ -68,13 +71,6 @@ pub(super) enum Edge {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Timer {
-    OnDelay,
-    OffDelay,
-    Retentive,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Counter {
     Up,
     Down,
@@ -98,6 +94,9 @@ const REFUSED: [&str; 14] = [
     "RANDOM",
     "DELAY",
 ];
+
+/// Timers that are those of the standard.
+const DELAYS: [&str; 2] = ["TON", "TOF"];
 
 /// Comparisons and their signs.
 const COMPARISONS: [(&str, &str); 6] =
@@ -351,9 +350,9 @@ impl<'a> Parser<'a> {
             "OSR" => Some(Kind::Edge(Edge::Rising)),
             "OSF" => Some(Kind::Edge(Edge::Falling)),
             "MASTER_RELAY" => Some(Kind::MasterRelay),
-            "TON" => self.timer(Timer::OnDelay, own(1), own(2), span),
-            "TOF" => self.timer(Timer::OffDelay, own(1), own(2), span),
-            "RTO" => self.timer(Timer::Retentive, own(1), own(2), span),
+            "RTO" => {
+                self.delayed(own(1), own(2), span).map(|(name, delay)| Kind::Retentive(name, delay))
+            }
             "CTU" => counter(Counter::Up, own(1), own(2)),
             "CTD" => counter(Counter::Down, own(1), own(2)),
             "CTC" => counter(Counter::Circular, own(1), own(2)),
@@ -366,7 +365,11 @@ impl<'a> Parser<'a> {
                 return None;
             }
             word => {
-                if let Some((_, sign)) = COMPARISONS.iter().find(|(known, _)| *known == word) {
+                if let Some(timer) = DELAYS.iter().find(|known| **known == word) {
+                    self.delayed(own(1), own(2), span)
+                        .map(|(name, delay)| Kind::Timer(timer, name, delay))
+                } else if let Some((_, sign)) = COMPARISONS.iter().find(|(known, _)| *known == word)
+                {
                     own(1).zip(own(2)).map(|(left, right)| Kind::Compare(sign, left, right))
                 } else if let Some((_, sign)) =
                     CALCULATIONS.iter().find(|(known, _)| *known == word)
@@ -414,18 +417,18 @@ impl<'a> Parser<'a> {
         found
     }
 
-    fn timer(
+    /// The name and the delay of a timer.
+    fn delayed(
         &mut self,
-        timer: Timer,
         name: Option<String>,
         delay: Option<String>,
         span: &Range<usize>,
-    ) -> Option<Kind> {
+    ) -> Option<(String, Duration)> {
         let delay = Duration::from_micros(delay?.parse().ok()?);
         if delay > understudy_ladder::MAXIMUM_PRESET_TIME {
             self.error("U1072", "a delay of more than 100 days", span.clone());
         }
-        Some(Kind::Timer(timer, name?, delay))
+        Some((name?, delay))
     }
 }
 

@@ -49,6 +49,48 @@ pub enum BlockKind {
     FTrig,
 }
 
+/// What a block takes of a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cost {
+    /// Timers.
+    pub timers: u64,
+    /// Counters.
+    pub counters: u64,
+    /// Bits that remember.
+    pub bits: u64,
+}
+
+/// A row of the table of standard blocks: what is the same for each preset. What a block does is in the library of Structured Text.
+#[derive(Debug, Clone, Copy)]
+struct Standard {
+    word: &'static str,
+    wire: &'static str,
+    side: &'static [(&'static str, bool)],
+    outputs: &'static [&'static str],
+    /// The input of the preset, and the output that runs up to it.
+    preset: Option<(&'static str, &'static str)>,
+    /// The power at the wire with which a timer runs; none where an edge starts it.
+    runs_while: Option<bool>,
+    needs_power: bool,
+    cost: Cost,
+}
+
+impl Standard {
+    /// A block with one bit and the usual output.
+    const fn of(wire: &'static str) -> Self {
+        Self {
+            word: "",
+            wire,
+            side: &[],
+            outputs: &["Q"],
+            preset: None,
+            runs_while: None,
+            needs_power: false,
+            cost: Cost { timers: 0, counters: 0, bits: 1 },
+        }
+    }
+}
+
 impl BlockKind {
     /// All of them, with presets of 0.
     pub const ALL: [Self; 10] = [
@@ -89,73 +131,92 @@ impl BlockKind {
         }
     }
 
+    /// Its row in the table of standard blocks.
+    const fn standard(self) -> Standard {
+        let timer = Standard {
+            preset: Some(("PT", "ET")),
+            cost: Cost { timers: 1, counters: 0, bits: 0 },
+            ..Standard::of("IN")
+        };
+        let counter = Standard {
+            preset: Some(("PV", "CV")),
+            cost: Cost { timers: 0, counters: 1, bits: 0 },
+            ..Standard::of("CU")
+        };
+        let latch = Standard { outputs: &["Q1"], ..Standard::of("S1") };
+        let edge = Standard::of("CLK");
+        match self {
+            Self::Ton(_) => {
+                Standard { word: "TON", runs_while: Some(true), needs_power: true, ..timer }
+            }
+            Self::Tof(_) => Standard { word: "TOF", runs_while: Some(false), ..timer },
+            Self::Tp(_) => Standard { word: "TP", ..timer },
+            Self::Ctu(_) => Standard { word: "CTU", side: &[("R", false)], ..counter },
+            Self::Ctd(_) => Standard { word: "CTD", wire: "CD", side: &[("LD", true)], ..counter },
+            Self::Ctud(_) => Standard {
+                word: "CTUD",
+                side: &[("CD", true), ("R", false), ("LD", false)],
+                outputs: &["QU", "QD"],
+                ..counter
+            },
+            Self::Sr => Standard { word: "SR", side: &[("R", true)], ..latch },
+            Self::Rs => Standard { word: "RS", wire: "S", side: &[("R1", true)], ..latch },
+            Self::RTrig => Standard { word: "R_TRIG", needs_power: true, ..edge },
+            Self::FTrig => Standard { word: "F_TRIG", ..edge },
+        }
+    }
+
     /// Its name in the standard.
     pub fn word(self) -> &'static str {
-        match self {
-            Self::Ton(_) => "TON",
-            Self::Tof(_) => "TOF",
-            Self::Tp(_) => "TP",
-            Self::Ctu(_) => "CTU",
-            Self::Ctd(_) => "CTD",
-            Self::Ctud(_) => "CTUD",
-            Self::Sr => "SR",
-            Self::Rs => "RS",
-            Self::RTrig => "R_TRIG",
-            Self::FTrig => "F_TRIG",
-        }
+        self.standard().word
     }
 
     /// The input that the wire enters.
     pub fn wire_input(self) -> &'static str {
-        match self {
-            Self::Ton(_) | Self::Tof(_) | Self::Tp(_) => "IN",
-            Self::Ctu(_) | Self::Ctud(_) => "CU",
-            Self::Ctd(_) => "CD",
-            Self::Sr => "S1",
-            Self::Rs => "S",
-            Self::RTrig | Self::FTrig => "CLK",
-        }
+        self.standard().wire
     }
 
     /// The other inputs, each with whether it must be fed.
     pub fn side_inputs(self) -> &'static [(&'static str, bool)] {
-        match self {
-            Self::Ctu(_) => &[("R", false)],
-            Self::Ctd(_) => &[("LD", true)],
-            Self::Ctud(_) => &[("CD", true), ("R", false), ("LD", false)],
-            Self::Sr => &[("R", true)],
-            Self::Rs => &[("R1", true)],
-            _ => &[],
-        }
+        self.standard().side
     }
 
     /// The outputs that a contact can read; the wire leaves at the first.
     pub fn outputs(self) -> &'static [&'static str] {
-        match self {
-            Self::Ctud(_) => &["QU", "QD"],
-            Self::Sr | Self::Rs => &["Q1"],
-            _ => &["Q"],
-        }
+        self.standard().outputs
     }
 
     /// All inputs in the order of the standard, the one that the wire enters first.
     pub fn inputs(self) -> impl Iterator<Item = &'static str> {
-        let preset = match (self.preset_time(), self.preset_value()) {
-            (Some(_), _) => Some("PT"),
-            (_, Some(_)) => Some("PV"),
-            (None, None) => None,
-        };
-        let side = self.side_inputs().iter().map(|(pin, _)| *pin);
-        [self.wire_input()].into_iter().chain(side).chain(preset)
+        let Standard { wire, side, preset, .. } = self.standard();
+        let side = side.iter().map(|(pin, _)| *pin);
+        [wire].into_iter().chain(side).chain(preset.map(|(pin, _)| pin))
     }
 
     /// The output that shows a time or a count.
     pub fn value_output(self) -> Option<&'static str> {
-        match (self.preset_time(), self.preset_value()) {
-            (Some(_), _) => Some("ET"),
-            (_, Some(_)) => Some("CV"),
-            (None, None) => None,
-        }
+        self.standard().preset.map(|(_, shown)| shown)
+    }
+
+    /// Whether its output is on only while there is power at its wire.
+    pub fn needs_power(self) -> bool {
+        self.standard().needs_power
+    }
+
+    /// What it takes of a controller.
+    pub fn cost(self) -> Cost {
+        self.standard().cost
+    }
+
+    /// The power at its wire with which a timer runs; none of a pulse timer, which an edge starts, and of all other blocks.
+    pub fn runs_while(self) -> Option<bool> {
+        self.standard().runs_while
+    }
+
+    /// ET of a timer with this output in a scan of its circuit, which does not tell an off-delay that is over from one that has not run.
+    pub(crate) fn shown_time(self, elapsed: Duration, output: bool) -> Duration {
+        let is_over = self.runs_while() == Some(false) && !output;
+        if is_over { self.preset_time().unwrap_or(elapsed) } else { elapsed }
     }
 
     /// The preset time of a timer.

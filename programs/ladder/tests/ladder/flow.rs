@@ -114,7 +114,8 @@ fn a_timer_tells_its_time() {
 fn check_observer(program: &Program, seed: u64) {
     let circuit = program.lower(PERIOD).expect("a right program");
     let scan = Scan::new(&circuit);
-    let observer = Observer::new(program, PERIOD).expect("a right program");
+    let observer = Observer::new(program, program.layout(PERIOD).expect("a right program"), PERIOD)
+        .expect("a right program");
     let mut naive = Interpreter::new(program, PERIOD).expect("a right program");
     let mut state = scan.initial().to_vec();
     let mut outputs = vec![0; scan.output_count().div_ceil(64)];

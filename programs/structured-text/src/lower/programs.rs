@@ -109,6 +109,7 @@ impl<'a> Lowering<'a> {
         if let Symbol::Variable(variable) = symbol
             && let Root::Global(slot) = variable.root
         {
+            self.ranges.extend(variable.range.map(|range| (name.to_owned(), range)));
             self.program.variables.push(Shown {
                 name: name.to_owned(),
                 of: variable.of.clone(),
@@ -333,6 +334,7 @@ impl<'a> Lowering<'a> {
             {
                 self.point(&shown, variable, slot, member.class == Class::Input);
             }
+            self.ranges.extend(variable.range.map(|range| (shown.clone(), range)));
             let Program { variables, hidden, .. } = &mut self.program;
             let of_it = if is_hidden { hidden } else { variables };
             of_it.push(Shown {

@@ -54,13 +54,6 @@ impl<'a> Ladders<'a> {
         };
         let File { source, read } = &mut self.read[place];
         let code = read.code(Arc::clone(source), name)?;
-        // Several controllers may run one ladder.
-        let warnings = read.ladder.as_ref().map(|ladder| ladder.preset_warnings(period));
-        for warning in warnings.into_iter().flatten() {
-            if !read.diagnostics.contains(&warning) {
-                read.diagnostics.push(warning);
-            }
-        }
         match code {
             Ok(code) => Some(code),
             Err(error) => {
@@ -100,12 +93,7 @@ impl<'a> Ladders<'a> {
             return place.clone();
         }
         let place = (self.open)(file).map(|text| {
-            let source = SourceText {
-                file: file.to_owned(),
-                text: Arc::from(text),
-                period,
-                renamed: Vec::new(),
-            };
+            let source = SourceText::of(file, &text, period);
             let mut read = source.read();
             if read.is_library {
                 read.diagnostics.push(no_program());

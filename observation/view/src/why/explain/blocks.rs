@@ -16,16 +16,21 @@ impl Explainer<'_> {
         place: usize,
         depth: usize,
     ) -> Option<Reason> {
-        let rung = self.program.rungs.iter().position(|rung| {
+        let rung = self.rung_of(name)?;
+        let is_before = rung < below || rung == below && self.is_before(rung, name, element);
+        let place = if is_before { place } else { self.history.scan_before(place)? };
+        self.block_at(name, rung, place, depth)
+    }
+
+    /// The rung with the block of this name.
+    pub(super) fn rung_of(&self, name: &str) -> Option<usize> {
+        self.program.rungs.iter().position(|rung| {
             let mut found = false;
             visit(&rung.network, &mut |element| {
                 found |= matches!(element, Element::Block(block) if block.name.as_str() == name);
             });
             found
-        })?;
-        let is_before = rung < below || rung == below && self.is_before(rung, name, element);
-        let place = if is_before { place } else { self.history.scan_before(place)? };
-        self.block_at(name, rung, place, depth)
+        })
     }
 
     /// Whether a block of a rung is called before an element of it is looked at.
@@ -111,10 +116,10 @@ impl Explainer<'_> {
             Reading::Number(number) => number.to_string(),
             _ => String::new(),
         };
-        let preset = duration::text(found.block.kind.preset_time().unwrap_or_default());
-        match found.block.kind {
-            BlockKind::Ton(_) | BlockKind::Tof(_) => {
-                let on = matches!(found.block.kind, BlockKind::Ton(_));
+        let kind = found.block.kind;
+        let preset = kind.preset_time().map(duration::text).unwrap_or_default();
+        match (kind.runs_while(), kind.preset_time(), kind.preset_value()) {
+            (Some(on), ..) => {
                 if enters != on {
                     let power =
                         if enters { "its input has power" } else { "its input has no power" };
@@ -134,7 +139,7 @@ impl Explainer<'_> {
                 };
                 (format!("{what} {since}, {over}"), None)
             }
-            BlockKind::Tp(_) => {
+            (None, Some(_), _) => {
                 if !leaves {
                     let what = if enters {
                         "its pulse is over, and its input still has power"
@@ -152,7 +157,7 @@ impl Explainer<'_> {
                     Some(since),
                 )
             }
-            BlockKind::Ctu(preset) | BlockKind::Ctd(preset) | BlockKind::Ctud(preset) => {
+            (None, None, Some(preset)) => {
                 let (since, known) = self.unchanged(name, rung, place, |flow| flow.reading);
                 let since_text = if known {
                     format!(" since cycle {}", self.cycle(since))
@@ -161,7 +166,7 @@ impl Explainer<'_> {
                 };
                 (format!("CV is {elapsed}, PV {preset}{since_text}"), Some(since))
             }
-            BlockKind::Sr | BlockKind::Rs => {
+            _ if matches!(kind, BlockKind::Sr | BlockKind::Rs) => {
                 if leaves && !enters {
                     let (since, _) = self.unchanged(name, rung, place, |flow| flow.enters);
                     let set = self.history.scan_before(since).unwrap_or(since);
@@ -177,7 +182,7 @@ impl Explainer<'_> {
                 };
                 (what.to_owned(), None)
             }
-            BlockKind::RTrig | BlockKind::FTrig => {
+            _ => {
                 let what = if leaves {
                     "its input has just changed"
                 } else {

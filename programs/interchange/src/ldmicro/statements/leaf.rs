@@ -2,7 +2,7 @@
 
 use understudy_text::Diagnostic;
 
-use super::super::parse::{Counter, Edge, Element, Kind, Timer};
+use super::super::parse::{Counter, Edge, Element, Kind};
 use super::{Use, Writer};
 
 impl Writer {
@@ -28,7 +28,7 @@ impl Writer {
                 self.line(&format!("{before} := {power};"), span);
                 shot
             }
-            Kind::Timer(Timer::Retentive, name, delay) => {
+            Kind::Retentive(name, delay) => {
                 let name = self.name(name, Use::Number, span);
                 let scans = delay.as_nanos().div_ceil(self.period.as_nanos()).max(1);
                 if scans > 0x7fff {
@@ -53,8 +53,7 @@ impl Writer {
                         format!("two elements share the timer `{name}`, which is not supported");
                     self.diagnostics.push(Diagnostic::error("U1074", message, span.clone()));
                 }
-                let word = if *timer == Timer::OnDelay { "TON" } else { "TOF" };
-                self.blocks.push((name.clone(), word));
+                self.blocks.push((name.clone(), timer));
                 let delay = delay.as_micros();
                 self.line(&format!("{name}(IN := {power}, PT := T#{delay}us);"), span);
                 format!("{name}.Q")
