@@ -5,7 +5,7 @@
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use understudy_cluster::value_text;
+use understudy_cluster::{same_point, value_text};
 use understudy_typed::{Elementary, Point, Points};
 use understudy_wire::Image;
 
@@ -21,8 +21,8 @@ pub struct Signals {
     pub outputs: Vec<String>,
     /// u, point by point.
     pub input_points: Points,
-    /// y, point by point.
-    pub output_points: Points,
+    /// y, point by point: from a cycle on, those of the version of the program that counted. The first ones from 0.
+    pub output_points: Vec<(u64, Points)>,
     /// Whether some inputs do not come from the field, so that u is what the remote I/O samples.
     pub sourced: bool,
     /// Moving parts of its simulated plant, in order.
@@ -213,7 +213,8 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
                 shown = "inputs";
             }
             lanes.extend(position_lanes(&trace.positions, &signals.positions));
-            lanes.extend(point_lanes(&trace.sensors, &signals.input_points));
+            let points = [(0, signals.input_points.clone())];
+            lanes.extend(point_lanes(&trace.sensors, &points));
         }
         let summary = summary.plants.iter().find(|plant| plant.name == plant_name);
         panels.push(Panel {
@@ -278,11 +279,35 @@ fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
         .collect()
 }
 
-/// A lane for each point: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
-fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
-    let lanes = points.iter().map(|point| {
-        let spans = || trace.spans().filter(|(.., image)| image.width() >= points.width());
-        let values = || spans().map(|(from, to, image)| (from, to, point.get(image.words())));
+/// The stored values of a point, where the program had it by name and type.
+fn values_of<'a>(
+    trace: &'a Trace<Image>,
+    stretches: &'a [(u64, Points)],
+    point: &'a Point,
+) -> impl Iterator<Item = (u64, u64, u64)> + 'a {
+    let ends = stretches.iter().skip(1).map(|(from, _)| *from).chain([u64::MAX]);
+    let own = stretches.iter().zip(ends).filter_map(move |((begin, points), end)| {
+        Some((*begin, end, points.width(), same_point(point, points)?))
+    });
+    own.flat_map(|(begin, end, width, own)| {
+        let spans = trace.spans().filter(move |(.., image)| image.width() >= width);
+        let within = spans.map(move |(from, to, image)| (from.max(begin), to.min(end), image));
+        let within = within.filter(|(from, to, _)| from < to);
+        within.map(move |(from, to, image)| (from, to, own.get(image.words())))
+    })
+}
+
+/// A lane for each point that the program had: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
+fn point_lanes(trace: &Trace<Image>, stretches: &[(u64, Points)]) -> Vec<Lane> {
+    let mut all: Vec<&Point> = Vec::new();
+    for (place, (_, points)) in stretches.iter().enumerate() {
+        let is_new = |point: &&Point| {
+            stretches[..place].iter().all(|(_, before)| same_point(point, before).is_none())
+        };
+        all.extend(points.iter().filter(is_new));
+    }
+    let lanes = all.into_iter().map(|point| {
+        let values = || values_of(trace, stretches, point);
         let ends = ends(point, values().map(|(.., stored)| stored));
         let (name, share): (String, Box<dyn Fn(f64) -> f64>) = match ends {
             _ if point.of == Elementary::Bool => (point.name.clone(), Box::new(|value| value)),

@@ -99,6 +99,7 @@ pub(crate) fn describe(
                 | "in-effect"
                 | "timed"
                 | "wall-clock"
+                | "points"
         ),
     }
 }
