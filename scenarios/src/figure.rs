@@ -418,3 +418,45 @@ fn service_shades(intervals: &[Interval<Service>]) -> Vec<(u64, u64, RGBColor)> 
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A point that stays is one lane, at whichever place it is; the lane of any other one begins or ends with the points.
+    #[test]
+    fn a_lane_has_the_values_of_its_point_wherever_that_is() {
+        let points = |all: &[(&str, Elementary)]| {
+            let mut points = Points::default();
+            all.iter().for_each(|(name, of)| points.push(name, *of, 0));
+            points
+        };
+        let [bool, int] = [Elementary::Bool, Elementary::Int];
+        let before = points(&[("stays", bool), ("goes", bool), ("retyped", bool)]);
+        let after = points(&[("comes", int), ("retyped", int), ("stays", bool)]);
+        let image = |points: &Points, values: &[(&str, u64)]| {
+            let mut image = Image::zero(points.width());
+            for (name, value) in values {
+                let point = points.find(name).expect("a point");
+                point.set(image.words_mut(), *value);
+            }
+            image
+        };
+        let mut trace = Trace::default();
+        trace.push(0, &image(&before, &[("stays", 0), ("goes", 1), ("retyped", 1)]));
+        trace.push(1, &image(&before, &[("stays", 1), ("goes", 1), ("retyped", 0)]));
+        trace.push(2, &image(&after, &[("stays", 1), ("comes", 5), ("retyped", 7)]));
+        trace.push(3, &image(&after, &[("stays", 0), ("comes", 9), ("retyped", 7)]));
+        let lanes = point_lanes(&trace, &[(0, before), (2, after)]);
+        let found: Vec<(&str, &[Step])> =
+            lanes.iter().map(|lane| (lane.name.as_str(), &lane.steps[..])).collect();
+        let expected: [(&str, &[Step]); 5] = [
+            ("stays", &[(0, 1, 0.0), (1, 3, 1.0), (3, 4, 0.0)]),
+            ("goes", &[(0, 2, 1.0)]),
+            ("retyped", &[(0, 1, 1.0), (1, 2, 0.0)]),
+            ("comes 5 … 9", &[(2, 3, 0.0), (3, 4, 1.0)]),
+            ("retyped 7", &[(2, 4, 0.5)]),
+        ];
+        assert_eq!(found, expected);
+    }
+}

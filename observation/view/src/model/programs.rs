@@ -60,8 +60,11 @@ impl ProgramTrack {
     }
 }
 
-/// Alarms of questions to the operator about a state: they end with the program's state known.
-const QUESTIONS: [&str; 2] = ["disputed", "configuration-disputed"];
+/// The alarm of a remote I/O that has not loaded the points of the program that runs.
+pub(super) const POINTS_UNKNOWN: &str = "points-unknown";
+
+/// Alarms about a state that its remote I/O does not continue from, such as questions to the operator: they end with the program's state known.
+const QUESTIONS: [&str; 3] = ["disputed", "configuration-disputed", POINTS_UNKNOWN];
 
 impl Model {
     pub(super) fn remote_io(&mut self, record: &Record, program: ProgramId, event: &RemoteIoEvent) {
@@ -173,6 +176,10 @@ impl Model {
             }
             RemoteIoEvent::ChangeTakenBack { .. } => {
                 alarm = Some(CHANGE_TAKEN_BACK);
+                None
+            }
+            RemoteIoEvent::PointsUnknown { .. } => {
+                alarm = Some(POINTS_UNKNOWN);
                 None
             }
             // The engineer has moved the change on.

@@ -8,6 +8,7 @@ use understudy_wire::{Member, OrderRefusal, ProgramId, ProgramSet, StationId, St
 
 use super::Model;
 use super::pairs::{INPUT_MODULES, PARTNER_LOST};
+use super::programs::POINTS_UNKNOWN;
 use super::silence::{NOT_RECEIVED, Silence};
 use super::standing::{Change, ProgramChange, Standing};
 use crate::alarm::{STATE_LOST, Subject, UNPROTECTED};
@@ -57,8 +58,15 @@ impl Model {
     /// fails.
     pub(super) fn remote_io_is_new(&mut self, member: Member, program: ProgramId) {
         let name = self.members().name(member).to_owned();
-        let over =
-            [STATE_LOST, PARTNER_LOST, INPUT_MODULES, "forced", "field-lost", "field-contested"];
+        let over = [
+            STATE_LOST,
+            PARTNER_LOST,
+            INPUT_MODULES,
+            POINTS_UNKNOWN,
+            "forced",
+            "field-lost",
+            "field-contested",
+        ];
         self.alarms.all_over(&name, &over, self.cycles.of(None));
         if let Some(history) = self.histories.get_mut(program.index()) {
             history.starts_again();

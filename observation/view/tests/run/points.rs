@@ -11,7 +11,7 @@ use understudy_remote_io::Event;
 use understudy_simulator::{Action, ChangeStep, Fault};
 use understudy_testing::Folder;
 use understudy_view::{AlarmState, Bounds, Filter, JournalLine, Listing, Model, Run};
-use understudy_wire::{Image, Member, PointValue, ProgramId, StationId};
+use understudy_wire::{Image, Lineage, Member, PointValue, ProgramId, StationId};
 
 use crate::changed::{model, records_of};
 
@@ -318,6 +318,30 @@ fn points_that_are_not_known_have_no_names() {
         is_new ^= line.event == "points-changed";
         let has_names = ["shown = ", "done = "].iter().any(|name| line.text.contains(name));
         assert!(!is_new || !has_names, "{}", line.text);
+    }
+}
+
+/// A remote I/O that has not loaded the points of the program that runs samples nothing: an alarm until it continues.
+#[test]
+fn a_remote_io_without_the_points_of_its_program_is_an_alarm() {
+    let (cluster, records) = run(Vec::new());
+    let mut model = model(&cluster, &records);
+    let members = model.members().clone();
+    let moment = records.iter().rev().find_map(|record| match &record.event {
+        Happening::RemoteIo(Event::Applied { moment, .. }) => Some(*moment),
+        _ => None,
+    });
+    let moment = moment.expect("a deadline");
+    let version = clusters()[1].controllers()[0].hash;
+    let adopted = Event::AdoptedLineage { moment, lineage: Lineage(1), from: StationId(0) };
+    let lasts = |model: &Model| -> Vec<bool> {
+        let alarms = model.alarms().filter(|alarm| alarm.alarm == "points-unknown");
+        alarms.map(|alarm| alarm.over.is_none()).collect()
+    };
+    for (event, expected) in [(Event::PointsUnknown { moment, version }, true), (adopted, false)] {
+        let event = Happening::RemoteIo(event);
+        model.note(&Record::of_member(0, REMOTE_IO, &members, event));
+        assert_eq!(lasts(&model), [expected]);
     }
 }
 
