@@ -428,7 +428,7 @@ mod tests {
     fn a_lane_has_the_values_of_its_point_wherever_that_is() {
         let points = |all: &[(&str, Elementary)]| {
             let mut points = Points::default();
-            all.iter().for_each(|(name, of)| points.push(name, *of, 0));
+            all.iter().for_each(|(name, of)| points.push(*name, *of, 0));
             points
         };
         let [bool, int] = [Elementary::Bool, Elementary::Int];
