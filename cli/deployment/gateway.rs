@@ -165,14 +165,15 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         }
         What::Modbus { run, listen, allow_writes } => {
             let run = run.open()?;
-            let gate = allow_writes.then(|| WriteGate::new(&run));
-            let run = Followed::new(&run).map_err(failed)?;
-            serve_modbus(run, gate, *listen, &mut ready).map_err(failed)?;
+            let followed = Followed::new(&run).map_err(failed)?;
+            let gate = allow_writes.then(|| WriteGate::new(&run, &followed));
+            serve_modbus(followed, gate, *listen, &mut ready).map_err(failed)?;
             Ok(ended())
         }
         What::Signals { run, from, keys } => {
             let run = run.open()?;
-            let gate = WriteGate::new(&run);
+            let followed = Followed::new(&run).map_err(failed)?;
+            let gate = WriteGate::new(&run, &followed);
             let keys = match keys {
                 Some(folder) => {
                     let date = Date::of(SystemTime::now());
@@ -205,9 +206,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         }
         What::Zenoh { run, listen, rate, allow_writes } => {
             let run = run.open()?;
-            let gate = allow_writes.then(|| WriteGate::new(&run));
-            let run = Followed::new(&run).map_err(failed)?;
-            mirror(&run, gate, *listen, *rate, &mut ready).map_err(failed)?;
+            let followed = Followed::new(&run).map_err(failed)?;
+            let gate = allow_writes.then(|| WriteGate::new(&run, &followed));
+            mirror(&followed, gate, *listen, *rate, &mut ready).map_err(failed)?;
             Ok(ended())
         }
     }

@@ -202,13 +202,17 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
 fn command(arguments: &Arguments, owner: &str) -> Result<Command, Answer> {
     let word = arguments.word();
     Ok(match arguments.what {
-        What::Force => Command::Force(force(arguments, written(arguments)?.cluster(), owner)?),
-        What::Unforce => Command::Unforce(unforce(arguments, written(arguments)?.cluster())?),
-        What::Write => Command::Write(write(
-            arguments,
-            written(arguments)?.cluster(),
-            (owner, Role::Engineer),
-        )?),
+        // By the points that count: an online change may have replaced those of the cluster file.
+        What::Force => {
+            Command::Force(force(arguments, written(arguments)?.points().cluster(), owner)?)
+        }
+        What::Unforce => {
+            Command::Unforce(unforce(arguments, written(arguments)?.points().cluster())?)
+        }
+        What::Write => {
+            let points = written(arguments)?.points();
+            Command::Write(write(arguments, points.cluster(), (owner, Role::Engineer))?)
+        }
         What::Kill => Command::Kill,
         What::Restart => Command::Restart,
         What::Release => Command::Release,

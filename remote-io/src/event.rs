@@ -43,6 +43,11 @@ pub enum Event {
         /// Hash of the program after.
         to: ProgramHash,
     },
+    /// The version of the program whose points count from the start of the process on.
+    Points {
+        /// Hash of the version.
+        version: ProgramHash,
+    },
     /// The points of another version of the program count from now on: for all that is reported of inputs and outputs after this.
     PointsChanged {
         /// Cycle.
@@ -88,7 +93,10 @@ pub enum Event {
         word_of: Option<StationId>,
         /// Reason why no output was provable, where the outputs are held or fail-safe.
         missing: Option<Missing>,
-        /// Stations whose turns of this cycle were received here.
+        /// The version of the program whose points these inputs and outputs have, while a change of points is loaded.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        points: Option<ProgramHash>,
+        /// Stations whose turns of this cycle were received here; the last key, which a reader of lines finds.
         heard: StationSet,
     },
     /// The program starts from its initial state.

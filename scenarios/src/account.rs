@@ -21,10 +21,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::{HostEvent, Quantiles};
-use understudy_cluster::{AlarmDeclaration, OnlineChanges};
+use understudy_cluster::AlarmDeclaration;
 use understudy_cycle::Agreement;
 use understudy_journal::{
-    AlarmChange, Happening, Members, Numbering, Record, TimeOfDay, TimesOfDay, moment,
+    AlarmChange, Happening, Members, NamedSignal, Numbering, Present, Record, TimeOfDay,
+    TimesOfDay, Turn, moment,
 };
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
@@ -61,6 +62,9 @@ const MAXIMUM_OPEN_CYCLES: usize = 2048;
 /// Violations that are listed, at most; all are counted.
 const MAXIMUM_VIOLATIONS: usize = 100;
 
+/// Stretches of cycles with the same points that the figure tells apart, at most.
+const MAXIMUM_STRETCHES: usize = 64;
+
 /// Unexpected ends of members that are listed, at most; all are counted.
 const MAXIMUM_DEATHS: usize = 100;
 
@@ -79,8 +83,8 @@ pub struct Terms {
     pub plants: ProgramSet,
     /// Alarms on signals.
     pub alarms: Arc<[AlarmDeclaration]>,
-    /// The online changes of the run.
-    pub changes: OnlineChanges,
+    /// The points that count, across the online changes of the run.
+    pub present: Present,
 }
 
 /// Who says where the origin is.
@@ -109,6 +113,8 @@ pub(crate) struct DoneStep {
 pub(crate) struct DoneForce {
     pub(crate) program: ProgramId,
     pub(crate) force: Force,
+    /// Its signal, by the points of that time; nothing where the program had none there.
+    pub(crate) signal: Option<NamedSignal>,
     /// The first cycle with it; nothing before the origin.
     pub(crate) from: Option<u64>,
     /// The first cycle without it; nothing where it lasts.
@@ -310,6 +316,7 @@ impl Account {
     /// Takes the next record.
     pub fn observe(&mut self, record: &Record) {
         self.records += 1;
+        self.turned(record);
         self.times.note(record);
         self.absences.note(record);
         if let (Happening::Host(event), Some(member)) = (&record.event, record.member) {
@@ -359,6 +366,32 @@ impl Account {
             if let Some(number) = number {
                 let period = self.terms.agreement.schedule.period();
                 self.stalls.stalled(number, member, late, period);
+            }
+        }
+    }
+
+    /// Programs may change by a change from a record on, or other points count.
+    fn turned(&mut self, record: &Record) {
+        let program = match self.terms.present.take(record) {
+            Some(Turn::Loaded(change)) => {
+                self.terms.referees.iter_mut().for_each(|referee| referee.learn(&change));
+                return;
+            }
+            Some(Turn::Points(program)) => program,
+            None => return,
+        };
+        let version = self.terms.present.controller(program);
+        let outputs = version.map(|version| version.interface.outputs.clone());
+        let changes = self.alarms.fold.lay_out(program, version);
+        self.alarms_changed(&changes, None);
+        let number = moment(&record.event).and_then(|moment| self.numbering.of(moment));
+        let from = number.and_then(|number| self.since_origin(number)).or(self.next_cycle());
+        if let Some(signals) = self.terms.signals.get_mut(program.index()) {
+            let stretches = &mut signals.output_points;
+            // After the last one nothing has a name.
+            let named = outputs.filter(|_| stretches.len() + 1 < MAXIMUM_STRETCHES);
+            if stretches.len() < MAXIMUM_STRETCHES {
+                stretches.push((from.unwrap_or(0), named.unwrap_or_default()));
             }
         }
     }

@@ -5,7 +5,7 @@
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use understudy_cluster::value_text;
+use understudy_cluster::{same_point, value_text};
 use understudy_typed::{Elementary, Point, Points};
 use understudy_wire::Image;
 
@@ -21,8 +21,8 @@ pub struct Signals {
     pub outputs: Vec<String>,
     /// u, point by point.
     pub input_points: Points,
-    /// y, point by point.
-    pub output_points: Points,
+    /// y, point by point: from a cycle on, those of the version of the program that counted. The first ones from 0.
+    pub output_points: Vec<(u64, Points)>,
     /// Whether some inputs do not come from the field, so that u is what the remote I/O samples.
     pub sourced: bool,
     /// Moving parts of its simulated plant, in order.
@@ -213,7 +213,8 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
                 shown = "inputs";
             }
             lanes.extend(position_lanes(&trace.positions, &signals.positions));
-            lanes.extend(point_lanes(&trace.sensors, &signals.input_points));
+            let points = [(0, signals.input_points.clone())];
+            lanes.extend(point_lanes(&trace.sensors, &points));
         }
         let summary = summary.plants.iter().find(|plant| plant.name == plant_name);
         panels.push(Panel {
@@ -278,11 +279,35 @@ fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
         .collect()
 }
 
-/// A lane for each point: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
-fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
-    let lanes = points.iter().map(|point| {
-        let spans = || trace.spans().filter(|(.., image)| image.width() >= points.width());
-        let values = || spans().map(|(from, to, image)| (from, to, point.get(image.words())));
+/// The stored values of a point, where the program had it by name and type.
+fn values_of<'a>(
+    trace: &'a Trace<Image>,
+    stretches: &'a [(u64, Points)],
+    point: &'a Point,
+) -> impl Iterator<Item = (u64, u64, u64)> + 'a {
+    let ends = stretches.iter().skip(1).map(|(from, _)| *from).chain([u64::MAX]);
+    let own = stretches.iter().zip(ends).filter_map(move |((begin, points), end)| {
+        Some((*begin, end, points.width(), same_point(point, points)?))
+    });
+    own.flat_map(|(begin, end, width, own)| {
+        let spans = trace.spans().filter(move |(.., image)| image.width() >= width);
+        let within = spans.map(move |(from, to, image)| (from.max(begin), to.min(end), image));
+        let within = within.filter(|(from, to, _)| from < to);
+        within.map(move |(from, to, image)| (from, to, own.get(image.words())))
+    })
+}
+
+/// A lane for each point that the program had: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
+fn point_lanes(trace: &Trace<Image>, stretches: &[(u64, Points)]) -> Vec<Lane> {
+    let mut all: Vec<&Point> = Vec::new();
+    for (place, (_, points)) in stretches.iter().enumerate() {
+        let is_new = |point: &&Point| {
+            stretches[..place].iter().all(|(_, before)| same_point(point, before).is_none())
+        };
+        all.extend(points.iter().filter(is_new));
+    }
+    let lanes = all.into_iter().map(|point| {
+        let values = || values_of(trace, stretches, point);
         let ends = ends(point, values().map(|(.., stored)| stored));
         let (name, share): (String, Box<dyn Fn(f64) -> f64>) = match ends {
             _ if point.of == Elementary::Bool => (point.name.clone(), Box::new(|value| value)),
@@ -392,4 +417,46 @@ fn service_shades(intervals: &[Interval<Service>]) -> Vec<(u64, u64, RGBColor)> 
             Some((interval.from, interval.to, colour))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A point that stays is one lane, at whichever place it is; the lane of any other one begins or ends with the points.
+    #[test]
+    fn a_lane_has_the_values_of_its_point_wherever_that_is() {
+        let points = |all: &[(&str, Elementary)]| {
+            let mut points = Points::default();
+            all.iter().for_each(|(name, of)| points.push(*name, *of, 0));
+            points
+        };
+        let [bool, int] = [Elementary::Bool, Elementary::Int];
+        let before = points(&[("stays", bool), ("goes", bool), ("retyped", bool)]);
+        let after = points(&[("comes", int), ("retyped", int), ("stays", bool)]);
+        let image = |points: &Points, values: &[(&str, u64)]| {
+            let mut image = Image::zero(points.width());
+            for (name, value) in values {
+                let point = points.find(name).expect("a point");
+                point.set(image.words_mut(), *value);
+            }
+            image
+        };
+        let mut trace = Trace::default();
+        trace.push(0, &image(&before, &[("stays", 0), ("goes", 1), ("retyped", 1)]));
+        trace.push(1, &image(&before, &[("stays", 1), ("goes", 1), ("retyped", 0)]));
+        trace.push(2, &image(&after, &[("stays", 1), ("comes", 5), ("retyped", 7)]));
+        trace.push(3, &image(&after, &[("stays", 0), ("comes", 9), ("retyped", 7)]));
+        let lanes = point_lanes(&trace, &[(0, before), (2, after)]);
+        let found: Vec<(&str, &[Step])> =
+            lanes.iter().map(|lane| (lane.name.as_str(), &lane.steps[..])).collect();
+        let expected: [(&str, &[Step]); 5] = [
+            ("stays", &[(0, 1, 0.0), (1, 3, 1.0), (3, 4, 0.0)]),
+            ("goes", &[(0, 2, 1.0)]),
+            ("retyped", &[(0, 1, 1.0), (1, 2, 0.0)]),
+            ("comes 5 … 9", &[(2, 3, 0.0), (3, 4, 1.0)]),
+            ("retyped 7", &[(2, 4, 0.5)]),
+        ];
+        assert_eq!(found, expected);
+    }
 }

@@ -205,8 +205,8 @@ pub struct ForceSummary {
 
 impl ForceSummary {
     fn new(done: &DoneForce, members: &Members) -> Self {
-        let DoneForce { program, force, from, to, refused } = done;
-        let known = members.signal(*program, force.signal);
+        let DoneForce { program, force, signal, from, to, refused } = done;
+        let known = signal.as_ref();
         let known =
             known.filter(|known| known.declared.of.bits() == u32::from(force.value.width()));
         let stored = force.value.stored();

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use understudy_cluster::{ChangeTexts, Cluster, OnlineChanges};
-use understudy_journal::Members;
+use understudy_cluster::Cluster;
+use understudy_journal::{Members, Present};
 use understudy_simulator::Referee;
 pub use understudy_simulator::parts;
 use understudy_wire::{ProgramId, ProgramSet};
@@ -30,7 +30,7 @@ impl Terms {
             inputs: controller.interface.inputs.bit_names(),
             outputs: controller.interface.outputs.bit_names(),
             input_points: controller.interface.inputs.clone(),
-            output_points: controller.interface.outputs.clone(),
+            output_points: vec![(0, controller.interface.outputs.clone())],
         });
         let mut plants = ProgramSet::default();
         for (program, plant) in cluster.plants().iter().enumerate() {
@@ -45,15 +45,7 @@ impl Terms {
             signals: signals.collect(),
             alarms: Arc::clone(cluster.alarms()),
             plants,
-            changes: OnlineChanges::of(Arc::new(cluster.clone())),
-        }
-    }
-
-    /// The programs may change by these texts from now on; those of another cluster are refused by its members.
-    pub(crate) fn learn(&mut self, texts: &ChangeTexts) {
-        if let Some(change) = self.changes.load(texts) {
-            let change = Arc::new(change);
-            self.referees.iter_mut().for_each(|referee| referee.learn(&change));
+            present: Present::of(Arc::new(cluster.clone())),
         }
     }
 }

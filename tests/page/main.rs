@@ -13,6 +13,7 @@ mod elsewhere;
 mod notify;
 mod paths;
 mod plant;
+mod points;
 mod present;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]

@@ -221,6 +221,8 @@ impl Referee {
         self.descent.forget();
         self.held = 0;
         self.blind = true;
+        // Nor which points it has since.
+        self.points.is_new = true;
     }
 
     /// The operator chooses the state that the program continues from: an older one, one of several, or the initial state.
@@ -468,7 +470,7 @@ impl Referee {
                 Err(Violation::NotTheFailSafe {
                     moment,
                     driven: driven.clone(),
-                    configured: self.fail_safe().cloned().unwrap_or_default(),
+                    configured: self.fail_safe().unwrap_or_default(),
                 })
             }
         }

@@ -8,6 +8,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use understudy_cluster::Cluster;
+use understudy_journal::PointsInEffect;
 use understudy_view::{Alarm, Bounds, Event, Following, Model, Progress, Reading, Run, Snapshot};
 use understudy_wire::ProgramId;
 
@@ -170,6 +171,11 @@ impl Followed {
         }
     }
 
+    /// The points that count, as they are shown.
+    pub(crate) fn naming(&self) -> Naming {
+        Naming(Arc::clone(&self.newest))
+    }
+
     /// The present snapshot.
     ///
     /// # Errors
@@ -191,6 +197,18 @@ impl Followed {
     pub fn take_events(&self) -> Vec<Event> {
         let mut newest = self.newest.write().unwrap_or_else(PoisonError::into_inner);
         std::mem::take(&mut newest.events)
+    }
+}
+
+/// The points that count in a followed run.
+#[derive(Debug)]
+pub(crate) struct Naming(Arc<RwLock<Newest>>);
+
+impl Naming {
+    /// Those of the newest snapshot.
+    pub(crate) fn points(&self) -> PointsInEffect {
+        let newest = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        newest.observation.snapshot.points.clone()
     }
 }
 

@@ -10,7 +10,6 @@ use serde_json::{Map, Value, json};
 use tokio::runtime::Runtime;
 use tokio::sync::Semaphore;
 use understudy_bus::Announcer;
-use understudy_cluster::Cluster;
 use understudy_executable::Interface;
 use understudy_typed::Points;
 use understudy_view::value_of;
@@ -69,7 +68,7 @@ pub fn mirror(
         loop {
             if let Ok(present) = run.observation() {
                 let state = present.state(present.feed(Instant::now()));
-                let known = documents(run.cluster(), &present.snapshot, state).into_iter();
+                let known = documents(&present.snapshot, state).into_iter();
                 // Alarms of the past are not known while it is read.
                 let reads_past = present.past_percent.is_some();
                 for (key, document) in known.filter(|(key, _)| !reads_past || key != "alarms") {
@@ -119,7 +118,7 @@ fn take_writes(
 }
 
 /// Each document with the end of its key.
-fn documents(cluster: &Cluster, snapshot: &Snapshot, state: &str) -> Vec<(String, Value)> {
+fn documents(snapshot: &Snapshot, state: &str) -> Vec<(String, Value)> {
     let mut documents = vec![
         (
             "run".to_owned(),
@@ -137,7 +136,8 @@ fn documents(cluster: &Cluster, snapshot: &Snapshot, state: &str) -> Vec<(String
         ("margin".to_owned(), json!(snapshot.margin)),
         ("alarms".to_owned(), json!(snapshot.alarms)),
     ];
-    for (controller, program) in cluster.controllers().iter().zip(&snapshot.programs) {
+    let controllers = snapshot.points.cluster().controllers();
+    for (controller, program) in controllers.iter().zip(&snapshot.programs) {
         let document = values(program, &controller.interface);
         documents.push((format!("programs/{}", controller.name), document));
     }
@@ -176,11 +176,17 @@ fn named(points: &Points, bits: Option<&str>) -> Option<Map<String, Value>> {
 
 #[cfg(test)]
 mod tests {
-    use understudy_journal::Members;
+    use understudy_cluster::ChangeTexts;
+    use understudy_journal::{Happening, Members, Record, RunEvent};
+    use understudy_remote_io::Event as RemoteIoEvent;
     use understudy_scenarios::{read, simulate};
     use understudy_testing::points::{self, POINTS};
     use understudy_typed::Elementary;
     use understudy_view::{Bounds, Model};
+    use understudy_wire::{Cycle, Epoch, Image, Member, Moment, ProgramId, Source, StationSet};
+
+    use crate::feed::Feed;
+    use crate::register_map::{Area, RegisterMap};
 
     use super::*;
 
@@ -203,6 +209,87 @@ mod tests {
         assert_eq!(named(&points, None), None);
     }
 
+    const FILE: &str = "[cluster]\nname = \"points\"\nsecurity = \"off\"\n[[controller]]\nname = \"one\"\nladder = \"one.st\"\n[[remote_io]]\ncontroller = \"one\"\n";
+    const BEFORE: &str = "PROGRAM one VAR_INPUT go : BOOL; step : INT; END_VAR VAR_OUTPUT shown : INT; done : BOOL; END_VAR shown := step; done := go; END_PROGRAM";
+    const AFTER: &str = "PROGRAM one VAR_INPUT more : INT; step : INT; END_VAR VAR_OUTPUT alarm : BOOL; shown : INT; END_VAR shown := step + more; END_PROGRAM";
+
+    /// Other inputs and outputs count from the second deadline on: documents have those, and the registers of points that are gone, or have become others, have no
+    /// value.
+    #[test]
+    fn an_online_change_of_points_is_followed() {
+        let clusters = [BEFORE, AFTER].map(|program| {
+            let read = understudy_cluster::read("c.toml", FILE, &mut |_| Ok(program.to_owned()));
+            read.cluster.expect("a cluster")
+        });
+        let texts = ChangeTexts::with_points(&clusters[0], &clusters[1]).expect("a change");
+        let hashes = [0, 1].map(|side: usize| clusters[side].controllers()[0].hash);
+        let members = Members::of(&clusters[0]);
+        let moment = |cycle| Moment { epoch: Epoch(1), cycle: Cycle(cycle) };
+        let of_remote_io = |event| {
+            let event = Happening::RemoteIo(event);
+            Record::of_member(0, Member::RemoteIo(ProgramId(0)), &members, event)
+        };
+        let applied = |cycle, version: usize, values: &[(&str, u64)]| {
+            let interface = &clusters[version].controllers()[0].interface;
+            let image = |points: &Points| {
+                let mut image = Image::zero(points.width());
+                for (name, value) in values {
+                    points.find(name).into_iter().for_each(|it| it.set(image.words_mut(), *value));
+                }
+                image
+            };
+            of_remote_io(RemoteIoEvent::Applied {
+                moment: moment(cycle),
+                sampled: Some(image(&interface.inputs)),
+                outputs: image(&interface.outputs),
+                driven: None,
+                source: Source::Direct,
+                word_of: None,
+                missing: None,
+                points: Some(hashes[version]),
+                heard: StationSet::EMPTY,
+            })
+        };
+        let mut model = Model::new(Arc::new(clusters[0].clone()), Bounds::default());
+        model.note(&Record::of_run(0, RunEvent::ChangeLoaded { texts: Box::new(texts) }));
+        model.note(&applied(1, 0, &[("go", 1), ("step", 3), ("shown", 3), ("done", 1)]));
+        model.note(&Record::of_run(0, RunEvent::Origin { moment: moment(1), cycle: 1 }));
+        let map = RegisterMap::new(&clusters[0]).expect("it fits");
+        let program = |model: &Model| {
+            let documents = documents(&model.snapshot(), "running");
+            let (_, program) =
+                documents.into_iter().find(|(key, _)| key == "programs/one").expect("one");
+            program
+        };
+        let image = |model: &Model| map.image(&model.snapshot(), Feed::Live);
+        let declared = |side: &Value| {
+            let side = side.as_object().expect("values").clone().into_iter();
+            Value::Object(side.filter(|(name, _)| !name.starts_with("program.")).collect())
+        };
+        let shown = program(&model);
+        assert_eq!(declared(&shown["inputs"]), json!({ "go": true, "step": 3 }));
+        assert_eq!(declared(&shown["outputs"]), json!({ "shown": 3, "done": true }));
+        assert_eq!(image(&model).unknown, []);
+        let [from, to] = hashes;
+        model.note(&of_remote_io(RemoteIoEvent::PointsChanged { moment: moment(2), from, to }));
+        model.note(&applied(2, 1, &[("more", 4), ("step", 5), ("shown", 9), ("alarm", 1)]));
+        let shown = program(&model);
+        assert_eq!(declared(&shown["inputs"]), json!({ "more": 4, "step": 5 }));
+        assert_eq!(declared(&shown["outputs"]), json!({ "alarm": true, "shown": 9 }));
+        let image = image(&model);
+        let places = map.places().iter();
+        let at = |name: &str| places.clone().find(|place| place.name == name).expect("a place");
+        for (name, value) in [("one.step", 5), ("one.shown", 9)] {
+            let first = usize::from(at(name).address);
+            assert!(image.is_known(Area::Register, &(first..first + 1)), "{name}");
+            assert_eq!(image.registers[first], value, "{name}");
+        }
+        for (name, area) in [("one.go", Area::DiscreteInput), ("one.done", Area::Coil)] {
+            let first = usize::from(at(name).address);
+            assert!(!image.is_known(area, &(first..first + 1)), "{name}");
+        }
+    }
+
     /// Operators write each point of the table.
     #[test]
     fn a_value_is_what_the_author_of_its_point_declared() {
@@ -211,7 +298,7 @@ mod tests {
         let scenario = scenario.scenario.expect("right");
         let mut model = Model::new(Arc::new(cluster.clone()), Bounds::default());
         simulate(&cluster, &scenario, 1, &mut |record| model.note(record)).expect("in step");
-        let documents = documents(&cluster, &model.snapshot(), "finished");
+        let documents = documents(&model.snapshot(), "finished");
         let (_, program) =
             documents.iter().find(|(key, _)| key == "programs/one").expect("its document");
         for row in &POINTS {

@@ -165,6 +165,10 @@ async fn write(
     // A long IPv6 address loses its end.
     let owner = format!("modbus {}", caller.to_canonical());
     let owner: String = owner.chars().take(MAXIMUM_OWNER_LENGTH).collect();
+    // The registers are those of the cluster file, whatever an online change brings.
+    if !written.iter().all(|(target, _)| gate.has(target.member, &target.point)) {
+        return Err(ExceptionCode::IllegalDataAddress);
+    }
     let checked = written.iter().map(|(target, stored)| {
         let request = WriteRequest {
             input: &target.point.name,

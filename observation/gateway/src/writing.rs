@@ -16,13 +16,17 @@ use tokio::runtime::Handle;
 use tokio::sync::Semaphore;
 use tokio::time::Instant;
 use understudy_bus::{RefusedOrder, RefusedOrders, WriteLimiter};
-use understudy_cluster::Cluster;
+use understudy_cluster::{Cluster, same_point};
 use understudy_journal::{
-    Commander, Done, OperatorAction, Refusal, WriteRequest, WriteSessions, new_write,
+    Commander, Done, OperatorAction, PointsInEffect, Refusal, WriteRequest, WriteSessions,
+    new_write,
 };
 use understudy_text::visible;
+use understudy_typed::Point;
 use understudy_view::Run;
 use understudy_wire::{Member, Write, WriteId, WriteRefusal};
+
+use crate::followed::{Followed, Naming};
 
 /// Writes of all clients of a gateway that wait for their outcome at the same time.
 pub const MAXIMUM_WRITES: usize = 8;
@@ -34,6 +38,8 @@ pub const WRITES_PER_SECOND: u32 = understudy_bus::WRITES_PER_SECOND / 2;
 #[derive(Debug)]
 pub struct WriteGate {
     cluster: Arc<Cluster>,
+    /// Where the points that count are known from; those of the cluster otherwise.
+    naming: Option<Naming>,
     commander: Commander,
     sessions: WriteSessions,
     limiter: WriteLimiter,
@@ -49,14 +55,16 @@ type Numbered = BTreeMap<WriteId, (Instant, Write, Option<Done>)>;
 const REMEMBERED_FOR: Duration = Duration::from_secs(60);
 
 impl WriteGate {
-    /// The operator inputs of `run`.
-    pub fn new(run: &Run) -> Self {
-        Self::of(Arc::clone(run.cluster()), run.commander())
+    /// The operator inputs of `run`, by the points that count as `followed` tells.
+    pub fn new(run: &Run, followed: &Followed) -> Self {
+        let naming = Some(followed.naming());
+        Self { naming, ..Self::of(Arc::clone(run.cluster()), run.commander()) }
     }
 
     fn of(cluster: Arc<Cluster>, commander: Commander) -> Self {
         Self {
             cluster,
+            naming: None,
             sessions: WriteSessions::new(commander.clone()),
             commander,
             limiter: WriteLimiter::new(WRITES_PER_SECOND),
@@ -71,12 +79,26 @@ impl WriteGate {
         &self.cluster
     }
 
+    /// The points that count.
+    fn points(&self) -> PointsInEffect {
+        let first = || PointsInEffect::of(Arc::clone(&self.cluster));
+        self.naming.as_ref().map_or_else(first, Naming::points)
+    }
+
+    /// Whether a point of the cluster counts: an online change may have brought another one of its name.
+    pub fn has(&self, member: Member, point: &Point) -> bool {
+        let points = self.points();
+        let controller = member.sampled_program().and_then(|program| points.controller(program));
+        controller.is_some_and(|it| same_point(point, &it.interface.inputs).is_some())
+    }
+
     /// Checks a request; sends nothing.
     ///
     /// # Errors
     /// The refusal that the remote I/O would give for any of its inputs.
     pub fn check(&self, member: Member, request: &WriteRequest<'_>) -> Result<Write, Refusal> {
-        let write = new_write(&self.cluster, member, request).map_err(Refusal::from);
+        let points = self.points();
+        let write = new_write(points.cluster(), member, request).map_err(Refusal::from);
         write.inspect_err(|refusal| {
             self.log(member, request.owner, refusal);
             let name = self.cluster.member_name(member).unwrap_or_default();
@@ -128,7 +150,7 @@ impl WriteGate {
             let name = self.cluster.member_name(member).unwrap_or_default();
             let input = self.input_name(member, write.input);
             return busy.inspect_err(|busy| {
-                self.refuse(name, input, &write.owner, &write.reason, busy);
+                self.refuse(name, &input, &write.owner, &write.reason, busy);
             });
         }
         let owner = write.owner.clone();
@@ -167,16 +189,17 @@ impl WriteGate {
         done
     }
 
-    fn input_name(&self, member: Member, input: u16) -> &str {
+    fn input_name(&self, member: Member, input: u16) -> String {
         let Member::RemoteIo(program) = member else {
-            return "";
+            return String::new();
         };
-        let remote_io = self.cluster.remote_ios().get(program.index());
+        let points = self.points();
+        let remote_io = points.remote_io(program);
         let mut sources = remote_io.iter().flat_map(|remote_io| &remote_io.inputs);
         let found = sources.find(|source| {
             source.operator().is_some_and(|operator| operator.input.place.bit == input)
         });
-        found.map_or("", |source| source.name.as_str())
+        found.map_or_else(String::new, |source| source.name.clone())
     }
 
     fn numbered(&self) -> MutexGuard<'_, Numbered> {

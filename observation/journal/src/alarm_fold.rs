@@ -10,8 +10,9 @@
 use std::sync::Arc;
 
 use understudy_bus::HostEvent;
-use understudy_cluster::AlarmDeclaration;
+use understudy_cluster::{AlarmDeclaration, Controller, same_point};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
+use understudy_typed::Point;
 use understudy_wire::{Image, Member, Part, ProgramId};
 
 use crate::record::{Happening, Record, RunEvent};
@@ -65,6 +66,8 @@ struct Track {
     begun: bool,
     /// Whether its remote I/O does not run or is not received.
     silent: bool,
+    /// Whether its points are not known, so that none of its values is.
+    is_unnamed: bool,
     /// Of two remote I/Os of a program: the author, where that is known.
     author: Option<Member>,
 }
@@ -73,6 +76,8 @@ struct Track {
 #[derive(Debug, Clone)]
 pub struct AlarmFold {
     alarms: Arc<[AlarmDeclaration]>,
+    /// Of each, the point in the version of its program whose points count; nothing where that has none of its name and type.
+    points: Vec<Option<Point>>,
     conditions: Vec<Condition>,
     /// Whether each was raised and is not known to be over.
     lasting: Vec<bool>,
@@ -109,8 +114,38 @@ impl AlarmFold {
             conditions: vec![Condition::UNKNOWN; alarms.len()],
             lasting: vec![false; alarms.len()],
             tracks: vec![Track::default(); programs],
+            points: alarms.iter().map(|alarm| Some(alarm.point.clone())).collect(),
             alarms,
         }
+    }
+
+    /// Other points of a program count from now on; nothing of them is known where the version is not. An alarm goes on with the point of the same name and
+    /// type, and ends where there is none.
+    pub fn lay_out(
+        &mut self,
+        program: ProgramId,
+        version: Option<&Controller>,
+    ) -> Vec<AlarmChange> {
+        if let Some(track) = self.tracks.get_mut(program.index()) {
+            // By the points of before.
+            track.inputs = None;
+            track.is_unnamed = version.is_none();
+        }
+        let Some(version) = version else {
+            return self.forget(program);
+        };
+        let (inputs, outputs) = (&version.interface.inputs, &version.interface.outputs);
+        for (alarm, point) in self.alarms.iter().zip(&mut self.points) {
+            if alarm.program == program {
+                let points = if alarm.is_output { outputs } else { inputs };
+                *point = same_point(&alarm.point, points).cloned();
+            }
+        }
+        self.change(program, |_, point, condition| {
+            if point.is_none() {
+                *condition = Condition::OVER;
+            }
+        })
     }
 
     /// Takes the next record, of a cycle of the run; answers with the alarms that it changes.
@@ -178,7 +213,7 @@ impl AlarmFold {
             _ => return Vec::new(),
         };
         track.begun = true;
-        if track.silent {
+        if track.silent || track.is_unnamed {
             return Vec::new();
         }
         match (sampled, missing) {
@@ -188,14 +223,16 @@ impl AlarmFold {
             (None, Some(_)) => track.inputs = None,
         }
         let inputs = track.inputs.clone();
-        let value = |alarm: &AlarmDeclaration| {
+        let value = |alarm: &AlarmDeclaration, point: &Point| {
             let image = if alarm.is_output { event.driven() } else { inputs.as_ref() };
             let image = image?;
-            let ends = alarm.point.bit as usize + alarm.point.of.bits() as usize;
-            (ends <= image.width()).then(|| alarm.point.get(image.words()))
+            let ends = point.bit as usize + point.of.bits() as usize;
+            (ends <= image.width()).then(|| point.get(image.words()))
         };
-        self.change(program, |alarm, condition| {
-            condition.step(alarm, cycle, value(alarm));
+        self.change(program, |alarm, point, condition| {
+            if let Some(point) = point {
+                condition.step(alarm, cycle, value(alarm, point));
+            }
         })
     }
 
@@ -251,23 +288,24 @@ impl AlarmFold {
     }
 
     fn set(&mut self, program: ProgramId, to: Condition) -> Vec<AlarmChange> {
-        self.change(program, |_, condition| *condition = to)
+        let of = |point: Option<&Point>| if point.is_some() { to } else { Condition::OVER };
+        self.change(program, |_, point, condition| *condition = of(point))
     }
 
     /// Changes the conditions of a program.
     fn change(
         &mut self,
         program: ProgramId,
-        mut change: impl FnMut(&AlarmDeclaration, &mut Condition),
+        mut change: impl FnMut(&AlarmDeclaration, Option<&Point>, &mut Condition),
     ) -> Vec<AlarmChange> {
         let mut changes = Vec::new();
-        let alarms = self.alarms.iter().zip(&mut self.conditions).enumerate();
-        for (index, (alarm, condition)) in alarms {
+        let alarms = self.alarms.iter().zip(&self.points).zip(&mut self.conditions).enumerate();
+        for (index, ((alarm, point), condition)) in alarms {
             if alarm.program != program {
                 continue;
             }
             let before = condition.active;
-            change(alarm, condition);
+            change(alarm, point.as_ref(), condition);
             let active = condition.active;
             if active == before {
                 continue;

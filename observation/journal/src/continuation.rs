@@ -75,7 +75,8 @@ impl Followed {
             return None;
         }
         self.written = 0;
-        let event = RunEvent::Checkpoint { moment, cycle };
+        let is_changed = self.in_effect.is_changed();
+        let event = RunEvent::Checkpoint { moment, cycle, is_changed };
         Some(Record::of_run(record.at_ns, event))
     }
 

@@ -36,6 +36,8 @@ pub(crate) struct InEffect {
     plants: BTreeMap<Option<Member>, (u64, u64)>,
     /// Stations that have not published since they joined or adopted a state.
     joining: BTreeSet<Option<Member>>,
+    /// Whether programs or points may be other ones than at the beginning of the run.
+    is_changed: bool,
 }
 
 /// Online changes among them, at most: the newest.
@@ -67,6 +69,11 @@ impl InEffect {
             }
             return;
         }
+        self.is_changed |= matches!(
+            record.event,
+            Happening::Run(RunEvent::ChangeLoaded { .. })
+                | Happening::RemoteIo(RemoteIo::PointsChanged { .. })
+        );
         match effect(record) {
             Some(Effect::Replaces(subject)) => {
                 if BEFORE_TURNS.contains(&subject.1) {
@@ -104,6 +111,11 @@ impl InEffect {
         if is_change {
             self.forget_old_changes();
         }
+    }
+
+    /// Whether programs or points may be other ones than at the beginning of the run: a reader that knows no record of before would give wrong names.
+    pub(crate) fn is_changed(&self) -> bool {
+        self.is_changed
     }
 
     fn forget_old_changes(&mut self) {
@@ -212,7 +224,7 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::Configured(_) => of("configured"),
         RemoteIo::ProgramChanged { .. } => of("program-changed"),
         RemoteIo::ChangeTakenBack { .. } => of("change-taken-back"),
-        RemoteIo::PointsChanged { .. } => of("points-changed"),
+        RemoteIo::Points { .. } | RemoteIo::PointsChanged { .. } => of("points"),
         RemoteIo::PointsUnknown { .. } => of("points-unknown"),
         RemoteIo::Forced { force, .. } => about("forced", &force.signal),
         RemoteIo::Unforced { signal, .. } => return Some(Effect::Ends(about("forced", signal))),

@@ -18,6 +18,7 @@ mod operator;
 mod packed_file;
 mod packing;
 mod place;
+mod present;
 mod record;
 mod repeated;
 mod rules;
@@ -47,6 +48,7 @@ pub use operator::{
 };
 pub use packed_file::{SegmentFile, open_file};
 pub use place::{CheckpointPlace, Place, continuation_before, place_before};
+pub use present::{PointsInEffect, Present, Turn};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use repeated::{RecordsInEffect, heard_at_deadline, repeated};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};

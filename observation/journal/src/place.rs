@@ -32,6 +32,8 @@ pub struct CheckpointPlace {
     pub moment: Moment,
     /// The cycle of the run that this is.
     pub cycle: i64,
+    /// Whether online changes were loaded or done before it: which programs and points there are, the beginning of its segment says.
+    pub is_changed: bool,
 }
 
 impl Place {
@@ -110,33 +112,41 @@ fn find_place(path: &Path, cycle: i64) -> io::Result<Option<CheckpointPlace>> {
     // The first segments of a run may have none, and the newest has none yet.
     let is_before = |segment: &PathBuf| {
         let first = SegmentFile::open(segment).map(|mut file| checkpoint_of(&mut file, 0));
-        !matches!(first, Ok(Some((_, first))) if first > cycle)
+        !matches!(first, Ok(Some(first)) if first.cycle > cycle)
     };
     let end = segments.partition_point(is_before);
     for segment in segments[..end].iter().rev() {
         let mut file = SegmentFile::open(segment)?;
-        let Some((piece, (moment, cycle))) = piece_before(&mut file, cycle) else {
+        let Some((piece, Checkpoint { moment, cycle, is_changed })) =
+            piece_before(&mut file, cycle)
+        else {
             continue;
         };
         let place = Place::of(file, piece, segment != path)?;
-        return Ok(place.map(|place| CheckpointPlace { place, moment, cycle }));
+        return Ok(place.map(|place| CheckpointPlace { place, moment, cycle, is_changed }));
     }
     Ok(None)
 }
 
-fn piece_before(file: &mut SegmentFile, cycle: i64) -> Option<(usize, (Moment, i64))> {
+fn piece_before(file: &mut SegmentFile, cycle: i64) -> Option<(usize, Checkpoint)> {
     let pieces: Vec<usize> = (0..file.pieces().ok()?.len()).collect();
     let end = pieces.partition_point(
-        |piece| !matches!(checkpoint_of(file, *piece), Some((_, found)) if found > cycle),
+        |piece| !matches!(checkpoint_of(file, *piece), Some(found) if found.cycle > cycle),
     );
     (0..end).rev().find_map(|piece| {
         let found = checkpoint_of(file, piece)?;
-        (found.1 <= cycle).then_some((piece, found))
+        (found.cycle <= cycle).then_some((piece, found))
     })
 }
 
+struct Checkpoint {
+    moment: Moment,
+    cycle: i64,
+    is_changed: bool,
+}
+
 /// The first checkpoint of a piece.
-fn checkpoint_of(file: &mut SegmentFile, piece: usize) -> Option<(Moment, i64)> {
+fn checkpoint_of(file: &mut SegmentFile, piece: usize) -> Option<Checkpoint> {
     let text = file.text_of(piece).ok()?;
     let mut lines = text.split(|byte| *byte == b'\n');
     lines.find_map(|line| {
@@ -146,7 +156,9 @@ fn checkpoint_of(file: &mut SegmentFile, piece: usize) -> Option<(Moment, i64)> 
             return None;
         }
         match serde_json::from_slice::<Record>(line).ok()?.event {
-            Happening::Run(RunEvent::Checkpoint { moment, cycle }) => Some((moment, cycle)),
+            Happening::Run(RunEvent::Checkpoint { moment, cycle, is_changed }) => {
+                Some(Checkpoint { moment, cycle, is_changed })
+            }
             _ => None,
         }
     })

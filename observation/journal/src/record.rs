@@ -62,6 +62,9 @@ pub enum RunEvent {
         moment: Moment,
         /// Which cycle of the run it is.
         cycle: i64,
+        /// Whether online changes were loaded or done before it: programs and points are then those that the beginning of its segment says.
+        #[serde(rename = "changed", default, skip_serializing_if = "is_false")]
+        is_changed: bool,
     },
     /// The second record of a file that continues a run, since version 3: what the files before have counted.
     Continues(Box<Continuation>),
@@ -250,11 +253,16 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             RemoteIo::Refused { .. }
             | RemoteIo::RefusalEnded { .. }
             | RemoteIo::Outvoted { .. }
+            | RemoteIo::Points { .. }
             | RemoteIo::Configured(_) => None,
         },
         Happening::Plant(understudy_plant::Event::Stepped { moment, .. }) => Some(*moment),
         Happening::Plant(_) | Happening::Host(_) | Happening::Run(_) => None,
     }
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// As it stands in a line, before the member has decided of which kind the event is.

@@ -123,6 +123,7 @@ mod tests {
             source: Source::Direct,
             word_of: None,
             missing: None,
+            points: Some(understudy_wire::ProgramHash(3)),
             heard,
         });
         let line = |record: &Record| serde_json::to_string(record).expect("JSON") + "\n";
@@ -153,6 +154,7 @@ mod tests {
             source: Source::Direct,
             word_of: None,
             missing: None,
+            points: None,
             heard: StationSet::EMPTY,
         });
         let first = record(1, |moment| RemoteIo::Protected { moment });

@@ -55,6 +55,10 @@ impl Writing {
         let Some(login) = login.filter(|login| login.role >= Role::Operator) else {
             return StatusCode::BadUserAccessDenied;
         };
+        // An online change may have brought another input of its name.
+        if !self.gate.has(input.member, &input.point) {
+            return StatusCode::BadInvalidState;
+        }
         let stored = match stored_of(input.point.of, value) {
             Ok(stored) => stored,
             Err(status) => return status,

@@ -87,12 +87,14 @@ pub fn serve(
     let variables = variables(run.cluster());
     let logins = tokens(&settings.logins);
     let may_write = logins.values().any(|login| login.role >= Role::Operator);
-    let writing = may_write.then(|| Writing::new(WriteGate::new(run), logins, &variables));
+    let followed = Followed::new(run)?;
+    let writing =
+        may_write.then(|| Writing::new(WriteGate::new(run, &followed), logins, &variables));
     let shown = Shown {
         variables,
         writing: writing.map(Arc::new),
         journal: run.path().join("journal.jsonl"),
-        followed: Followed::new(run)?,
+        followed,
     };
     let served =
         serve_until_asked(settings.address, ready, |listener| listen(listener, settings, shown));

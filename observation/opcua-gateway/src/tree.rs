@@ -18,8 +18,8 @@ use understudy_cluster::{Cluster, Controller, InputSource};
 use understudy_gateway::{Feed, Observation};
 use understudy_journal::TimeOfDay;
 use understudy_typed::Point;
-use understudy_view::{Event, ProgramSnapshot, StationSnapshot};
-use understudy_wire::Member;
+use understudy_view::{Event, ImageSide, ProgramSnapshot, StationSnapshot};
+use understudy_wire::{Member, ProgramId};
 
 use crate::trust;
 
@@ -74,6 +74,12 @@ pub(crate) struct Seen<'a> {
 impl Seen<'_> {
     fn program(&self, place: usize) -> Option<&ProgramSnapshot> {
         self.observation.snapshot.programs.get(place)
+    }
+
+    /// The stored value of a point; nothing where the program has no point of that name and type any more, after an online change.
+    fn stored(&self, place: usize, side: ImageSide, point: &Point) -> Option<u64> {
+        let program = ProgramId(u8::try_from(place).ok()?);
+        self.observation.snapshot.stored(program, side, point)
     }
 
     fn station(&self, rank: usize) -> Option<&StationSnapshot> {

@@ -97,6 +97,7 @@ pub(crate) fn describe(
                 | "in-effect"
                 | "timed"
                 | "wall-clock"
+                | "points"
         ),
     }
 }

@@ -7,7 +7,7 @@ use understudy_typed::{Point, Points};
 use understudy_wire::{Image, ProgramId};
 
 use crate::model::Model;
-use crate::timeline::Timeline;
+use crate::series::Images;
 use crate::value::point_text;
 
 /// What differs.
@@ -109,18 +109,20 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
         };
         let (ours, theirs) = (ProgramId(place as u8), ProgramId(other as u8));
         let (one, two) = (left.series(), right.series());
-        let interface = &controller.interface;
-        let (inputs, outputs) = (&interface.inputs, &interface.outputs);
         let pairs = [
-            (Differing::Inputs, inputs, one.inputs(ours), two.inputs(theirs)),
-            (Differing::Outputs, outputs, one.outputs(ours), two.outputs(theirs)),
+            (Differing::Inputs, one.inputs(ours), two.inputs(theirs)),
+            (Differing::Outputs, one.outputs(ours), two.outputs(theirs)),
         ];
-        for (what, points, one, two) in pairs {
+        for (what, one, two) in pairs {
             if let (Some(one), Some(two)) = (one, two) {
-                let mut found = first(name, what, one, two, end, image_text);
+                let borders = [one.borders(0, end), two.borders(0, end)].concat();
+                let image =
+                    |images: &'_ Images, cycle| images.at(cycle).map(|(_, image)| image.clone());
+                let at = |cycle| [image(one, cycle), image(two, cycle)];
+                let mut found = first(name, what, borders, end, at, image_text);
                 if let Some(found) = &mut found {
                     let images = [one.at(found.cycle), two.at(found.cycle)];
-                    differing_values(found, points, images);
+                    differing_values(found, images);
                 }
                 differences.extend(found);
             }
@@ -129,7 +131,12 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
             let word = |source: Option<&understudy_wire::Source>| {
                 source.map_or("nothing", |source| source_word(*source)).to_owned()
             };
-            differences.extend(first(name, Differing::Source, one, two, end, word));
+            let borders = [one, two].map(|timeline| {
+                let spans = timeline.spans(0, end);
+                spans.flat_map(|span| [span.from, span.to]).collect::<Vec<i64>>()
+            });
+            let at = |cycle| [one, two].map(|timeline| timeline.at(cycle).copied());
+            differences.extend(first(name, Differing::Source, borders.concat(), end, at, word));
         }
     }
     differences.extend(events(left, right, end));
@@ -149,11 +156,15 @@ fn image_text(image: Option<&Image>) -> String {
 }
 
 /// Shows images by the points that differ, by name and value.
-fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Image>; 2]) {
-    let [Some(left), Some(right)] = images else {
+fn differing_values(found: &mut Difference, images: [Option<(&Points, &Image)>; 2]) {
+    let [Some((points, left)), Some((others, right))] = images else {
         return;
     };
-    if [left, right].iter().any(|it| it.width() != points.width()) {
+    let are_same = points.len() == others.len()
+        && points.iter().zip(others.iter()).all(|(one, other)| {
+            (&one.name, one.bit, one.declared()) == (&other.name, other.bit, other.declared())
+        });
+    if !are_same || [left, right].iter().any(|it| it.width() != points.width()) {
         return;
     }
     let points = points.iter();
@@ -168,35 +179,32 @@ fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Im
     (found.left, found.right) = (text(left), text(right));
 }
 
-/// The first cycle from 0 to below `end` in which two timelines differ, and how many there are.
-fn first<T: Clone + PartialEq>(
+/// The first cycle from 0 to below `end` in which the values of two runs differ, and how many there are. They can only begin or cease to differ at the
+/// `borders`, where one of them changes.
+fn first<T: PartialEq>(
     name: &str,
     what: Differing,
-    left: &Timeline<T>,
-    right: &Timeline<T>,
+    mut borders: Vec<i64>,
     end: i64,
+    at: impl Fn(i64) -> [Option<T>; 2],
     text: impl Fn(Option<&T>) -> String,
 ) -> Option<Difference> {
-    // The runs can only begin or cease to differ where one of them changes.
-    let borders = |timeline: &Timeline<T>| -> Vec<i64> {
-        let spans = timeline.spans(0, end);
-        spans.flat_map(|span| [span.from, span.to]).collect()
-    };
-    let mut borders = [vec![0, end], borders(left), borders(right)].concat();
+    borders.extend([0, end]);
     borders.sort_unstable();
     borders.dedup();
     let mut found: Option<Difference> = None;
     for pair in borders.windows(2) {
         let (from, to) = (pair[0], pair[1]);
-        if left.at(from) == right.at(from) {
+        let [left, right] = at(from);
+        if left == right {
             continue;
         }
         let difference = found.get_or_insert_with(|| Difference {
             cycle: from,
             name: name.to_owned(),
             what,
-            left: text(left.at(from)),
-            right: text(right.at(from)),
+            left: text(left.as_ref()),
+            right: text(right.as_ref()),
             count: 0,
         });
         difference.count += (to - from).unsigned_abs();

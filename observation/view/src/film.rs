@@ -226,13 +226,12 @@ impl Model {
         let Some(images) = self.series().outputs(program) else {
             return (Vec::new(), 0);
         };
-        let interface = &self.cluster().controllers()[program.index()].interface;
-        let filmed = interface.outputs.iter().filter_map(|output| {
-            let values = joined(images.spans(from, to).map(|span| Span {
-                from: span.from,
-                to: span.to,
-                value: output.get(span.value.words()),
-            }));
+        // Those of the last cycle, as far back as the program has them.
+        let Some(controller) = self.points_at(program, Some(to.saturating_sub(1))) else {
+            return (Vec::new(), 0);
+        };
+        let filmed = controller.interface.outputs.iter().filter_map(|output| {
+            let values = joined(images.spans(output, from, to));
             // A program fault that never was is not worth a trace.
             let is_shown = is_declared(&output.name) || values.iter().any(|it| it.value != 0);
             is_shown.then(|| levels(output, values))

@@ -37,8 +37,12 @@ pub struct History {
     referee: Referee,
     steps: VecDeque<Step>,
     most: usize,
-    /// Bit of u(i) that resets a stopped program; nothing of a Boolean program, which never stops.
-    reset: Option<usize>,
+    /// The version of the program whose points count.
+    points: ProgramHash,
+    /// Whether these points are known; nothing is judged while they are not.
+    are_points_known: bool,
+    /// Bit of u(i) that resets a stopped program, of each version with points of its own; nothing of one that never stops.
+    resets: Vec<(ProgramHash, Option<usize>)>,
     /// Whether steps have gone, or were never seen.
     cut: bool,
     /// The newest samples, while it is not known which state they belong to.
@@ -76,10 +80,7 @@ impl History {
     pub(crate) fn new(cluster: &Cluster, program: ProgramId, most: usize) -> Option<Self> {
         let settings = cluster.remote_io_settings(program)?;
         let executable = cluster.programs().get(program.index())?.executable.clone();
-        let controller = cluster.controllers().get(program.index())?;
-        let inputs = &controller.interface.inputs;
-        let reset = inputs.find(TypedProgram::RESET);
-        let reset = reset.filter(|_| controller.can_stop());
+        let reset = settings.layout.stop.map(|stop| stop.reset);
         Some(Self {
             program,
             by: Member::RemoteIo(program),
@@ -89,7 +90,9 @@ impl History {
             referee: Referee::new(&settings, executable),
             steps: VecDeque::new(),
             most: most.max(2),
-            reset: reset.map(|reset| reset.bit as usize),
+            points: settings.hash,
+            are_points_known: true,
+            resets: vec![(settings.hash, reset)],
             cut: false,
             unplaced: VecDeque::new(),
             awaited: None,
@@ -215,6 +218,37 @@ impl History {
     /// Its program may change by this from now on.
     pub(crate) fn learn(&mut self, change: &Arc<OnlineChange>) {
         self.referee.learn(change);
+        let Some(changed) = change.of(self.program) else {
+            return;
+        };
+        let versions = [changed.before.hash, changed.after.hash];
+        let of_layout = |version| {
+            let layout = change.layout(self.program, version)?;
+            Some(layout.stop.map(|stop| stop.reset))
+        };
+        let known = versions.iter().find_map(|version| self.resets_of(*version)).flatten();
+        for version in versions {
+            // Both have the points of the one that is known where the change replaces none.
+            let reset = of_layout(version).unwrap_or(known);
+            self.resets.retain(|(of, _)| *of != version);
+            self.resets.push((version, reset));
+        }
+        let more = self.resets.len().saturating_sub(MOST_VERSIONS);
+        self.resets.drain(..more);
+    }
+
+    fn resets_of(&self, version: ProgramHash) -> Option<Option<usize>> {
+        self.resets.iter().rev().find(|(of, _)| *of == version).map(|(_, reset)| *reset)
+    }
+
+    /// The points of a version of the program count from now on, which may not be known here.
+    pub(crate) fn lay_out(&mut self, version: ProgramHash, is_known: bool) {
+        self.points = version;
+        // What was sampled by points that are not known belongs to no state that is.
+        if self.are_points_known != is_known {
+            self.misses_records();
+        }
+        self.are_points_known = is_known;
     }
 
     /// Whether an online change has replaced the program before a cycle.
@@ -273,10 +307,15 @@ impl History {
         at: Time,
         event: &Event,
     ) -> (Option<Sampled>, Option<Violation>) {
-        let violation = self.referee.observe_from(member, at, event).err();
         if let Event::Sampled { moment, change: Some(_), .. } = event {
             self.replaced.get_or_insert(*moment);
         }
+        if !self.are_points_known
+            && let Event::Sampled { .. } | Event::Applied { .. } = event
+        {
+            return (None, None);
+        }
+        let violation = self.referee.observe_from(member, at, event).err();
         let Event::Sampled { moment, inputs, before, change, .. } = event else {
             return (None, violation);
         };
@@ -285,11 +324,12 @@ impl History {
             let step = Taken { change: *change, inputs: inputs.clone() };
             let (program, state) = self.referee.taken(*before, &step)?;
             let after = before.after_step(&step);
-            let was_stopped = self.fault_in(&state).is_some();
-            let is_reset = self.reset.is_some_and(|reset| inputs.get(reset));
+            let was_stopped = self.fault_in(program, &state).is_some();
+            let reset = self.resets_of(program).flatten();
+            let is_reset = reset.is_some_and(|reset| inputs.get(reset));
             let is_taken_over = self.referee.program_of(*before) != Some(program);
             let keeps_other = was_stopped && !is_reset && (self.has_other_fault || is_taken_over);
-            let fault = self.fault_after(after).filter(|_| !keeps_other);
+            let fault = self.fault_after(program, after).filter(|_| !keeps_other);
             let sampled = Sampled {
                 program,
                 is_taken_over,
@@ -312,15 +352,15 @@ impl History {
         (Some(sampled), violation)
     }
 
-    /// The program fault that a state holds.
-    fn fault_in(&self, state: &Image) -> Option<Fault> {
+    /// The program fault that a state of a program holds.
+    fn fault_in(&self, program: ProgramHash, state: &Image) -> Option<Fault> {
         let has_header = state.words().len() >= TypedProgram::HEADER as usize;
-        self.reset.filter(|_| has_header)?;
+        self.resets_of(program).flatten().filter(|_| has_header)?;
         Fault::read(state.words())
     }
 
-    fn fault_after(&self, after: Lineage) -> Option<Fault> {
-        self.fault_in(self.referee.state_of(after)?)
+    fn fault_after(&self, program: ProgramHash, after: Lineage) -> Option<Fault> {
+        self.fault_in(program, self.referee.state_of(after)?)
     }
 
     /// Keeps a sample until it is known which state it belongs to.
@@ -380,6 +420,7 @@ impl History {
             Event::Applied { moment, outputs, source, word_of, missing, heard, .. } => {
                 let driven = Driven {
                     by: member,
+                    points: self.points,
                     outputs: event.driven().unwrap_or(outputs).clone(),
                     unforced: outputs.clone(),
                     source: *source,
@@ -388,8 +429,9 @@ impl History {
                     heard: *heard,
                     inputs: None,
                     fail_safe: (*source == Source::FailSafe)
-                        .then(|| self.referee.fail_safe().cloned())
-                        .flatten(),
+                        .then(|| self.referee.fail_safe())
+                        .flatten()
+                        .filter(|values| values.width() == outputs.width()),
                 };
                 match self.steps.back_mut() {
                     Some(last) if last.moment == *moment && last.driven.is_none() => {
@@ -469,6 +511,9 @@ impl History {
 fn is_of(sample: &Event, cycle: Moment) -> bool {
     matches!(sample, Event::Sampled { moment, .. } if *moment == cycle)
 }
+
+/// Versions of a program whose resets are known, at most.
+const MOST_VERSIONS: usize = 64;
 
 /// Lines of different members are so many cycles apart, at most.
 const NEWEST: usize = 64;

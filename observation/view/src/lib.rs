@@ -69,12 +69,12 @@ pub use process_alarm::{ProcessAlarm, Shelved};
 pub use protection::{LackingStation, LostState, Protection};
 pub use rehearsal::{FirstDifference, OutputDifference, Rehearsal, Rehearsed};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
-pub use series::Series;
+pub use series::{Images, Series};
 pub use shown_text::{NamedValue, ShownLine, Uses};
 pub use snapshot::{
-    LinkSnapshot, MarginSnapshot, NetworkSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState,
-    ProgramSnapshot, RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, SpareSnapshot,
-    StationSnapshot, TimingSnapshot, TwinSnapshot, WordSnapshot,
+    ImageSide, LinkSnapshot, MarginSnapshot, NetworkSnapshot, OutcomeSnapshot, PlantSnapshot,
+    PlantState, ProgramSnapshot, RemoteIoSnapshot, RemoteIoState, RunState, Snapshot,
+    SpareSnapshot, StationSnapshot, TimingSnapshot, TwinSnapshot, WordSnapshot,
 };
 pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use state_signal::StateSignal;

@@ -7,7 +7,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::{AlarmDeclaration, Cluster};
 use understudy_journal::{
-    AlarmFold, Cycles, Happening, Members, Record, RunEvent, TimeOfDay, TimesOfDay, moment,
+    AlarmChange, AlarmFold, Cycles, Happening, Present, Record, RunEvent, TimeOfDay, TimesOfDay,
+    Turn, moment,
 };
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_text::spelling::suggestion;
@@ -60,7 +61,7 @@ pub struct JournalLine {
 #[derive(Debug, Clone)]
 pub struct Listing {
     filter: Filter,
-    members: Members,
+    present: Present,
     writes: Writes,
     wanted: Vec<Member>,
     cycles: Cycles,
@@ -69,6 +70,8 @@ pub struct Listing {
     declared: Arc<[AlarmDeclaration]>,
     alarms: AlarmFold,
     times: TimesOfDay,
+    /// The records that are in effect follow.
+    continues: bool,
 }
 
 impl Listing {
@@ -77,7 +80,8 @@ impl Listing {
     /// # Errors
     /// Every name and word of the filter that does not exist.
     pub fn new(cluster: &Cluster, filter: Filter) -> Result<Self, Vec<ViewError>> {
-        let members = Members::of(cluster);
+        let present = Present::of(Arc::new(cluster.clone()));
+        let members = present.members();
         let names: Vec<&str> = members.iter().map(|(_, name)| name).chain(["laboratory"]).collect();
         let programs: Vec<&str> =
             cluster.controllers().iter().map(|found| found.name.as_str()).collect();
@@ -104,14 +108,18 @@ impl Listing {
                 Some(program.index())
             }
         };
-        let wanted = members.iter().filter(|(member, _)| {
-            let program = of_program(member).and_then(|place| programs.get(place));
-            program.is_some_and(|name| filter.programs.iter().any(|wanted| wanted == name))
-        });
+        let wanted: Vec<Member> = members
+            .iter()
+            .filter(|(member, _)| {
+                let program = of_program(member).and_then(|place| programs.get(place));
+                program.is_some_and(|name| filter.programs.iter().any(|wanted| wanted == name))
+            })
+            .map(|(member, _)| member)
+            .collect();
         Ok(Self {
-            wanted: wanted.map(|(member, _)| member).collect(),
+            wanted,
             filter,
-            members,
+            present,
             writes: Writes::default(),
             cycles: Cycles::default(),
             sources: BTreeMap::new(),
@@ -119,6 +127,7 @@ impl Listing {
             declared: Arc::clone(cluster.alarms()),
             alarms: AlarmFold::new(Arc::clone(cluster.alarms()), cluster.controllers().len()),
             times: TimesOfDay::new(cluster.agreement().schedule.period()),
+            continues: false,
         })
     }
 
@@ -147,7 +156,8 @@ impl Listing {
         Self {
             cycles: self.cycles.again(),
             sources: BTreeMap::new(),
-            stops: self.stops.again(),
+            stops: Stops::new(self.present.first()),
+            present: self.present.again(),
             alarms: self.alarms.again(),
             ..self.clone()
         }
@@ -155,10 +165,19 @@ impl Listing {
 
     /// Takes the next record; answers with it in words and with the alarms that it changes, as far as they are wanted.
     pub fn take(&mut self, record: &Record) -> Vec<JournalLine> {
-        if let Happening::Run(RunEvent::Continues(from)) = &record.event
-            && self.cycles.latest().is_none()
-        {
-            self.cycles = Cycles::continuing(from.numbering.clone(), from.origin);
+        match &record.event {
+            Happening::Run(RunEvent::Continues(from)) => {
+                // Whoever has read what was before knows it.
+                self.continues = self.cycles.latest().is_none();
+                if self.continues {
+                    self.cycles = Cycles::continuing(from.numbering.clone(), from.origin);
+                }
+            }
+            Happening::Run(RunEvent::InEffect { record, .. }) if self.continues => {
+                self.turned(record);
+            }
+            Happening::Run(RunEvent::InEffect { .. }) => {}
+            _ => self.continues = false,
         }
         self.times.note_all(record);
         let cycle = self.cycle_of(record);
@@ -171,7 +190,8 @@ impl Listing {
         }
         let at = self.times.of_record(&record.name, record.at_ns);
         let at = at.or_else(|| self.times.of_cycle(cycle));
-        let changes = self.alarms.take(record, cycle);
+        let mut changes = self.turned(record);
+        changes.extend(self.alarms.take(record, cycle));
         let cycle = self.cycles.has_origin().then_some(cycle);
         let mut lines: Vec<JournalLine> = self.line(record, cycle, at).into_iter().collect();
         if changes.is_empty() || !self.is_wanted(record, cycle) {
@@ -195,6 +215,18 @@ impl Listing {
         lines
     }
 
+    /// Other points may count from a record on; answers with the alarms that this changes.
+    fn turned(&mut self, record: &Record) -> Vec<AlarmChange> {
+        let Some(turn) = self.present.take(record) else {
+            return Vec::new();
+        };
+        self.stops.turned(&turn, &self.present);
+        match turn {
+            Turn::Loaded(_) => Vec::new(),
+            Turn::Points(program) => self.alarms.lay_out(program, self.present.controller(program)),
+        }
+    }
+
     fn line(
         &mut self,
         record: &Record,
@@ -202,12 +234,12 @@ impl Listing {
         at: Option<TimeOfDay>,
     ) -> Option<JournalLine> {
         let changed = self.source_changed(record);
-        let fault = self.stops.take(record);
-        self.writes.note(record);
+        let fault = self.stops.take(record, &self.present);
+        self.writes.note(record, self.present.members());
         if !self.is_wanted(record, cycle) {
             return None;
         }
-        let mut description = describe(record, &self.members, &self.writes, &self.cycles);
+        let mut description = describe(record, self.present.members(), &self.writes, &self.cycles);
         let wants_source = self.filter.events.is_empty() || self.wants("source");
         if changed && wants_source && !self.filter.ordinary && !self.wants("applied") {
             description.event = "source";

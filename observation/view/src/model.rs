@@ -9,6 +9,7 @@ mod members;
 mod networks;
 mod pairs;
 mod past;
+mod points;
 mod process_alarms;
 mod programs;
 mod protection;
@@ -22,8 +23,8 @@ mod turns;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use understudy_cluster::{Cluster, OnlineChanges};
-use understudy_journal::{Cycles, Happening, Members, Record, TimeOfDay, TimesOfDay};
+use understudy_cluster::Cluster;
+use understudy_journal::{Cycles, Happening, Members, Present, Record, TimeOfDay, TimesOfDay};
 use understudy_wire::{Member, Moment, ProgramId};
 
 use crate::alarm::Alarms;
@@ -84,8 +85,7 @@ const LEAST_CYCLES: usize = 16;
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) cluster: Arc<Cluster>,
-    online_changes: OnlineChanges,
-    pub(crate) members: Members,
+    pub(crate) present: Present,
     pub(crate) writes: Writes,
     cycles: Cycles,
     changes: Changes,
@@ -137,7 +137,6 @@ impl Model {
         Self {
             alarms: Alarms::new(&members, programs),
             networks: Networks::default(),
-            members,
             writes: Writes::default(),
             cycles: Cycles::default(),
             changes: Changes::new(schedule.stations(), programs),
@@ -166,7 +165,7 @@ impl Model {
             last_margin: LastMargin::default(),
             read_from: None,
             continues: false,
-            online_changes: OnlineChanges::of(Arc::clone(&cluster)),
+            present: Present::of(Arc::clone(&cluster)),
             cluster,
         }
     }
@@ -177,7 +176,7 @@ impl Model {
             return;
         }
         self.records += 1;
-        self.writes.note(record);
+        self.writes.note(record, self.present.members());
         self.at_ns = record.at_ns;
         self.times.note(record);
         self.now = self.times.of_record(&record.name, record.at_ns);
@@ -191,6 +190,7 @@ impl Model {
     }
 
     fn take(&mut self, record: &Record) {
+        self.turned(record);
         match (&record.event, record.member) {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(record, station, event);
@@ -291,7 +291,7 @@ impl Model {
 
     /// A record as a sentence.
     pub(super) fn described(&self, record: &Record) -> Description {
-        describe(record, &self.members, &self.writes, &self.cycles)
+        describe(record, self.members(), &self.writes, &self.cycles)
     }
 
     /// A record that is an event.

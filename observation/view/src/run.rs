@@ -6,8 +6,9 @@ use std::sync::Arc;
 use serde_json::Value;
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commander, JournalError, TimesOfDay, Writing, check_journal, continuation_before, kept_cluster,
-    open_file, place_before, segments_of, writing,
+    Commander, Happening, JournalError, PointsInEffect, Present, Record, RunEvent, TimesOfDay,
+    Writing, check_journal, continuation_before, kept_cluster, open_file, place_before,
+    segments_of, writing,
 };
 use understudy_node::STATES_EVERY;
 use understudy_wire::{Cycle, Epoch, Moment};
@@ -146,6 +147,24 @@ impl Run {
         &self.cluster
     }
 
+    /// The points that count after its newest record.
+    pub fn points(&self) -> PointsInEffect {
+        let mut present = Present::of(Arc::clone(&self.cluster));
+        let begun = self.source_before(i64::MAX).map(|begun| begun.source);
+        let mut source = begun.unwrap_or_else(|| self.follow());
+        let mut take = |found: Result<Record, Trouble>| {
+            let Ok(record) = found else {
+                return;
+            };
+            match &record.event {
+                Happening::Run(RunEvent::InEffect { record, .. }) => present.take(record),
+                _ => present.take(&record),
+            };
+        };
+        while source.poll(&mut take) > 0 {}
+        present.points().clone()
+    }
+
     /// Whether its journal is complete: its results are there, or its writer has ended.
     pub fn is_finished(&self) -> bool {
         self.has_results() || writing(&self.path) == Writing::Over
@@ -281,8 +300,10 @@ impl Run {
         let mut model = self.model(bounds);
         let source = match begun {
             Some(begun) => {
-                model.begins_at(begun.moment, begun.cycle);
-                model.times_are(self.clocks_before(begun.cycle));
+                if let Some(moment) = begun.moment {
+                    model.begins_at(moment, begun.cycle);
+                    model.times_are(self.clocks_before(begun.cycle));
+                }
                 begun.source
             }
             None => self.follow(),
@@ -331,8 +352,10 @@ impl Run {
         if let Some(from) = from.filter(|_| self.cluster.alarms().is_empty())
             && let Some(found) = self.source_before(from - self.unknown_at_first())
         {
-            listing.begins_at(found.moment, found.cycle);
-            listing.times_are(self.clocks_before(found.cycle));
+            if let Some(moment) = found.moment {
+                listing.begins_at(moment, found.cycle);
+                listing.times_are(self.clocks_before(found.cycle));
+            }
             return Ok((listing, found.source));
         }
         if let Some(moment) = self.origin_of_summary() {
@@ -364,12 +387,16 @@ impl Run {
         times
     }
 
-    /// The records from a checkpoint on that is not after `cycle`.
+    /// The records from a checkpoint on that is not after `cycle`. Where programs have changed before it, from the beginning of its segment, which says how.
     fn source_before(&self, cycle: i64) -> Option<Begun> {
         let journal = self.path.join(JOURNAL);
         let found = place_before(&journal, cycle).ok().flatten()?;
+        if found.is_changed {
+            let source = self.follow_segment(found.cycle, 0)?;
+            return Some(Begun { source, moment: None, cycle: found.cycle });
+        }
         let source = Source::following_from(&journal, found.place).ok()?;
-        Some(Begun { source, moment: found.moment, cycle: found.cycle })
+        Some(Begun { source, moment: Some(found.moment), cycle: found.cycle })
     }
 
     /// The origin of the summary, for journals whose own record of it is gone.
@@ -381,12 +408,12 @@ impl Run {
     }
 }
 
-/// Records of a run from a checkpoint on.
+/// Records of a run from a checkpoint on, or from before it.
 struct Begun {
     source: Source,
-    /// A moment of the checkpoint.
-    moment: Moment,
-    /// The cycle of the run that this is.
+    /// A moment of the checkpoint; nothing where the records say first how cycles are counted.
+    moment: Option<Moment>,
+    /// The cycle of the checkpoint.
     cycle: i64,
 }
 

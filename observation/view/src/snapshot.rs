@@ -9,14 +9,18 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 use understudy_bus::Quantiles;
-use understudy_journal::{ClocksApart, TimeOfDay};
-use understudy_wire::Force;
+use understudy_cluster::same_point;
+use understudy_executable::Interface;
+use understudy_journal::{ClocksApart, PointsInEffect, TimeOfDay};
+use understudy_typed::Point;
+use understudy_wire::{Force, ProgramId};
 
 use crate::alarm::Alarm;
 use crate::online_change::ChangeSnapshot;
 use crate::process_alarm::ProcessAlarm;
 use crate::protection::{LostState, Protection};
 use crate::station::StationState;
+use crate::value::stored;
 
 /// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -74,6 +78,9 @@ pub struct Snapshot {
     pub scenario_over: Option<String>,
     /// Stations, by rank.
     pub stations: Vec<StationSnapshot>,
+    /// The points by which the inputs and outputs of this cycle are named.
+    #[serde(skip)]
+    pub points: PointsInEffect,
     /// Programs at their remote I/Os.
     pub programs: Vec<ProgramSnapshot>,
     /// Remote I/Os, by program.
@@ -129,6 +136,28 @@ impl Snapshot {
         let remote_ios = remote_ios.map(|of| (of.name.as_str(), &of.link));
         let plants = self.plants.iter().map(|of| (of.name.as_str(), &of.link));
         stations.chain(remote_ios).chain(plants)
+    }
+}
+
+/// The inputs or the outputs of a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageSide {
+    /// As last sampled.
+    Inputs,
+    /// As driven.
+    Outputs,
+}
+
+impl Snapshot {
+    /// The stored value of a point of a program; nothing where it is not known, and where the program has no point of that name and type in this cycle.
+    pub fn stored(&self, program: ProgramId, side: ImageSide, point: &Point) -> Option<u64> {
+        let of = self.programs.get(program.index())?;
+        let Interface { inputs, outputs } = &self.points.controller(program)?.interface;
+        let (points, bits) = match side {
+            ImageSide::Inputs => (inputs, of.inputs.as_deref()?),
+            ImageSide::Outputs => (outputs, of.outputs.as_deref()?),
+        };
+        stored(same_point(point, points)?, bits)
     }
 }
 
@@ -316,6 +345,9 @@ pub struct ProgramSnapshot {
     pub missing: Option<&'static str>,
     /// The program fault that has stopped it, with its line and its values; of a program with numbers.
     pub fault: Option<String>,
+    /// The version of the program by whose points this cycle is named, where they are not known: nothing is shown of its inputs and outputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unknown_points: Option<String>,
     /// u(i) as last sampled, element 1 first.
     pub inputs: Option<String>,
     /// y(i) as driven, element 1 first.

@@ -1,9 +1,7 @@
 //! Program faults: when a program is stopped by one, and when the operator has released it.
 
-use std::sync::Arc;
-
-use understudy_cluster::{Cluster, OnlineChanges};
-use understudy_journal::{Happening, Record, RunEvent};
+use understudy_cluster::{Cluster, Controller};
+use understudy_journal::{Happening, Present, Record, Turn};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_typed::Fault;
 use understudy_wire::{ProgramId, Time};
@@ -66,9 +64,7 @@ impl Stop {
 /// The program faults of a run, in the order of its records.
 #[derive(Debug, Clone)]
 pub(crate) struct Stops {
-    cluster: Arc<Cluster>,
-    changes: OnlineChanges,
-    /// Of the programs with numbers.
+    /// Of the programs that can stop.
     programs: Vec<(History, Stop)>,
 }
 
@@ -77,39 +73,53 @@ const CYCLES: usize = 2;
 
 impl Stops {
     pub(crate) fn new(cluster: &Cluster) -> Self {
-        let cluster = Arc::new(cluster.clone());
-        let changes = OnlineChanges::of(Arc::clone(&cluster));
-        Self { programs: Self::begun(&cluster), changes, cluster }
-    }
-
-    /// The same before the first record.
-    pub(crate) fn again(&self) -> Self {
-        Self::new(&self.cluster)
-    }
-
-    fn begun(cluster: &Cluster) -> Vec<(History, Stop)> {
         let programs = (0..).map(ProgramId).zip(cluster.controllers());
         let stopping = programs.filter(|(_, controller)| controller.can_stop());
         let histories = stopping.filter_map(|(program, _)| History::new(cluster, program, CYCLES));
-        histories.map(|history| (history, Stop::Running)).collect()
+        Self { programs: histories.map(|history| (history, Stop::Running)).collect() }
+    }
+
+    /// Other points count, or may count, from the next record on.
+    pub(crate) fn turned(&mut self, turn: &Turn, present: &Present) {
+        if let Turn::Loaded(change) = turn {
+            for program in change.programs.iter().map(|changed| changed.program) {
+                self.may_stop(program, present);
+            }
+        }
+        let mut histories = self.programs.iter_mut().map(|(history, _)| history);
+        match turn {
+            Turn::Loaded(change) => histories.for_each(|history| history.learn(change)),
+            Turn::Points(program) => {
+                let version = present.versions().get(program.index());
+                let history = histories.find(|history| history.program() == *program);
+                if let Some((history, version)) = history.zip(version) {
+                    history.lay_out(*version, present.controller(*program).is_some());
+                }
+            }
+        }
+    }
+
+    /// A program that could not stop may be replaced by one that can; of its state nothing is known here.
+    fn may_stop(&mut self, program: ProgramId, present: &Present) {
+        if self.programs.iter().any(|(history, _)| history.program() == program) {
+            return;
+        }
+        if let Some(mut history) = History::new(present.first(), program, CYCLES) {
+            history.misses_records();
+            self.programs.push((history, Stop::Running));
+        }
     }
 
     /// Takes the next record; the program fault that it shows, in words.
-    pub(crate) fn take(&mut self, record: &Record) -> Option<String> {
-        let event = match &record.event {
-            Happening::RemoteIo(event) => event,
-            Happening::Run(RunEvent::ChangeLoaded { texts }) => {
-                let change = Arc::new(self.changes.load(texts)?);
-                self.programs.iter_mut().for_each(|(history, _)| history.learn(&change));
-                return None;
-            }
-            _ => return None,
+    pub(crate) fn take(&mut self, record: &Record, present: &Present) -> Option<String> {
+        let Happening::RemoteIo(event) = &record.event else {
+            return None;
         };
         let member = record.member?;
         let program = member.sampled_program()?;
         let mut programs = self.programs.iter_mut();
         let (history, stop) = programs.find(|(history, _)| history.program() == program)?;
-        if !fits(&self.cluster, program, event) {
+        if !fits(present.controller(program), event) {
             return None;
         }
         let _ = history.note(0, member, Time(record.at_ns), event);
@@ -123,7 +133,7 @@ impl Stops {
                 let newest = newest.and_then(|step| step.sampled.as_ref());
                 match stop.decided(*missing, newest)? {
                     Change::Stopped(fault) => {
-                        let controller = self.changes.controller(program, history.running());
+                        let controller = present.controller_of(program, history.running());
                         Some(program_fault_text(controller, fault.as_ref()))
                     }
                     Change::Running => None,
@@ -134,12 +144,13 @@ impl Stops {
     }
 }
 
-/// Whether the images of a report are as wide as those of the program: a journal of other programs does not belong to this cluster.
-pub(crate) fn fits(cluster: &Cluster, program: ProgramId, event: &RemoteIoEvent) -> bool {
-    let Some(controller) = cluster.controllers().get(program.index()) else {
-        return false;
+/// Whether the images of a report are as wide as those of the version of its program whose points count: a journal of other programs does not belong to this
+/// cluster. Of a version that is not known, any are.
+pub(crate) fn fits(version: Option<&Controller>, event: &RemoteIoEvent) -> bool {
+    let Some(version) = version else {
+        return true;
     };
-    let interface = &controller.interface;
+    let interface = &version.interface;
     let are_inputs = |width| width == interface.inputs.width();
     match event {
         RemoteIoEvent::Sampled { inputs, .. } => are_inputs(inputs.width()),

@@ -88,11 +88,11 @@ pub(crate) fn value_text(value: &Value) -> String {
     }
 }
 
-/// The value of a point in a packed image, for drawing: a BOOL as 0 or 1, all else as a number.
-pub fn number_of(point: &Point, words: &[u64]) -> Value {
+/// A stored value of a point, for drawing: a BOOL as 0 or 1, all else as a number.
+pub fn number_of(point: &Point, stored: u64) -> Value {
     match point.of {
-        Elementary::Bool => point.get(words).into(),
-        of => number(of, point.get(words)),
+        Elementary::Bool => stored.into(),
+        of => number(of, stored),
     }
 }
 

@@ -24,7 +24,7 @@ use crate::describe::missing_text;
 use crate::error::ViewError;
 use crate::history::{Driven, History, Step};
 use crate::model::Model;
-use crate::value::{forced_point, forced_value, has_numbers, named, named_text, value_in};
+use crate::value::{self, forced_point, forced_value, has_numbers, named_text, value_in};
 use explain::Explainer;
 
 /// Why an output or a variable of a program has its value.
@@ -223,7 +223,11 @@ impl Model {
         let version = self.version_at(history, place)?;
         let controller = version.controller();
         let drove = self.driver_at(program, step);
-        let output = controller.interface.outputs.find(name);
+        let named_by = |driven: &Driven| self.present().controller_of(program, driven.points);
+        // By the points of this cycle.
+        let named = step.driven.as_ref().map_or(Some(controller), named_by);
+        let named = named.ok_or_else(|| self.not_known(program, step.cycle))?;
+        let output = named.interface.outputs.find(name);
         let decided = step.driven.as_ref().filter(|_| output.is_some());
         let source = decided.map(|driven| driven.source);
         let missing = decided.and_then(|driven| driven.missing);
@@ -238,13 +242,18 @@ impl Model {
             Some(Source::FailSafe) if output.is_some() => None,
             _ => Some(place),
         };
-        let scanned = match (output, &step.sampled) {
+        let of_scan = output.and_then(|_| controller.interface.outputs.find(name));
+        let scanned = match (of_scan, &step.sampled) {
             (Some(output), Some(sampled)) => Some(value_in(output, &sampled.outputs)),
             _ => None,
         };
         let drives = decided.or(kept.and_then(|kept| kept.driven.as_ref()));
-        let driven = drives.and_then(|driven| Some(value_in(output?, &driven.outputs)));
-        let unforced = drives.and_then(|driven| Some(value_in(output?, &driven.unforced)));
+        let value_of = |driven: &Driven, image: &Image| {
+            let output = named_by(driven)?.interface.outputs.find(name);
+            output.filter(|_| decided.is_some() || kept.is_some()).map(|it| value_in(it, image))
+        };
+        let driven = drives.and_then(|driven| value_of(driven, &driven.outputs));
+        let unforced = drives.and_then(|driven| value_of(driven, &driven.unforced));
         let typed = controller.code.typed();
         // What is held may have been proved by another program, before an online change.
         let stopped = missing == Some(Missing::ProgramFault);
@@ -277,14 +286,15 @@ impl Model {
         let value =
             driven.or(because.as_ref().map(|reason| reason.value.clone())).unwrap_or_default();
         let sampled = step.sampled.as_ref().into_iter();
-        let inputs = sampled.clone().flat_map(|it| named(&controller.interface.inputs, &it.inputs));
+        let inputs =
+            sampled.clone().flat_map(|it| value::named(&controller.interface.inputs, &it.inputs));
         let has_numbers = has_numbers(controller);
         let mut sampled = sampled.filter(|_| has_numbers);
         Ok(Why {
             at: None,
             signal: name.to_owned(),
             program: controller.name.clone(),
-            remote_io: self.members.name(drove).to_owned(),
+            remote_io: self.members().name(drove).to_owned(),
             cycle: step.cycle,
             age_cycles: None,
             forced: self.why_forced(program, name, step.cycle, &value, unforced.as_ref()),
@@ -316,10 +326,10 @@ impl Model {
         value: &Value,
         unforced: Option<&Value>,
     ) -> Option<WhyForced> {
-        let controller = &self.cluster.controllers()[program.index()];
         let standing = self.standing(cycle);
         let forced = standing.program(program)?.forced.iter().find(|forced| {
-            let point = forced_point(controller, &forced.force);
+            let controller = self.present().controller_of(program, forced.points);
+            let point = controller.and_then(|controller| forced_point(controller, &forced.force));
             point.is_some_and(|point| {
                 point.name == name && forced_value(point, &forced.force) == *value
             })
@@ -399,18 +409,17 @@ impl Model {
         };
         let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;
         let others = word.mask.iter().filter(|other| *other != program);
-        let outputs_of = |program: ProgramId, image: &Image| {
-            let outputs = &self.cluster.controllers()[program.index()].interface.outputs;
-            (image.width() >= outputs.width()).then_some(outputs)
+        let named_by = |program: ProgramId, image: &Image| {
+            let controller = self.points_of(program, step.moment)?;
+            (image.width() >= controller.interface.outputs.width()).then_some(controller)
         };
         let values = |program: ProgramId, image: &Image| {
-            let outputs = outputs_of(program, image).into_iter();
-            outputs.flat_map(|outputs| named(outputs, image)).collect()
+            let controller = named_by(program, image).into_iter();
+            controller.flat_map(|it| value::named(&it.interface.outputs, image)).collect()
         };
         let values_text = |program: ProgramId, image: &Image| {
-            let controller = &self.cluster.controllers()[program.index()];
-            let outputs = outputs_of(program, image).filter(|_| has_numbers(controller))?;
-            Some(named_text(outputs, image))
+            let controller = named_by(program, image).filter(|it| has_numbers(it))?;
+            Some(named_text(&controller.interface.outputs, image))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;
@@ -424,10 +433,10 @@ impl Model {
         let not_received = (0..self.cluster.agreement().schedule.stations() as u8)
             .map(StationId)
             .filter(|station| !driven.heard.contains(*station))
-            .map(|station| self.members.name(Member::Station(station)).to_owned());
+            .map(|station| self.members().name(Member::Station(station)).to_owned());
         let sampled = step.sampled.as_ref();
         Some(Reconstructed {
-            word_of: self.members.name(Member::Station(station)).to_owned(),
+            word_of: self.members().name(Member::Station(station)).to_owned(),
             mask: word.mask.iter().map(|member| self.program_name(member).to_owned()).collect(),
             word: word.sum.to_string(),
             others: others.collect(),

@@ -210,7 +210,7 @@ function signals(programs) {
   keyed(
     document.getElementById("signals-list"),
     programs,
-    (program) => program.name,
+    (program) => `${program.name} ${program.points}`,
     (program) => {
       const facts = run.programs[program.index];
       const line = (signal, kind, index) =>

@@ -79,7 +79,9 @@ function giver(member) {
     busy = true;
     setText(answer, "");
     try {
-      await tell("api/command", { member: member.name, command, owner: owner(), reason: reason.value });
+      // A signal is named by its place: that of these points.
+      const points = command.signal ? member.points : undefined;
+      await tell("api/command", { member: member.name, command, owner: owner(), reason: reason.value, points });
       dialog.close();
       toast(`✓ ${member.name}: ${done}, by ${owner()} at cycle ${state().newest}`);
     } catch (error) {
@@ -103,7 +105,7 @@ export function openMember(wanted, signal) {
     return;
   }
   const because = obstacle();
-  const { asked, give } = giver(member);
+  const { asked, give } = giver({ ...member, points: run.programs[member.program]?.points });
   const button = ([name, words, meaning, why, done]) => {
     const reasonWhy = because ?? run.commands.impossible[name] ?? why;
     return el("li", {},

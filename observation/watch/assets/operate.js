@@ -15,6 +15,11 @@ const id = (name) => document.getElementById(name);
 
 export const has = (facts) => facts.programs.some((program) => program.inputs.some((input) => input.operator || input.from));
 
+export function replacePoints() {
+  id("view-operate").replaceChildren();
+  prepare(run);
+}
+
 export function prepare(facts) {
   run = facts;
   const place = id("view-operate");
@@ -102,7 +107,8 @@ function makeControl(program, input, index) {
     say("busy", "… write under way");
     refresh();
     try {
-      const body = { member: program.remote_io, command: { command: "write", input: input.name, value: text }, owner: owner(), reason: id("operate-reason").value };
+      const command = { command: "write", input: input.name, value: text };
+      const body = { member: program.remote_io, command, owner: owner(), reason: id("operate-reason").value, points: program.points };
       const done = await tell("api/command", body);
       const cycle = done.run_cycle ?? done.cycle;
       say("done", `✓ ${kind === "pulse" ? "" : `${wordsOf(input, text)} `}in effect since cycle ${cycle}`);

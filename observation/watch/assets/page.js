@@ -5,6 +5,7 @@ import { act, ask, tell, toast } from "/ask.js";
 import * as banner from "/banner.js";
 import { setText } from "/element.js";
 import * as kept from "/kept.js";
+import * as points from "/points.js";
 import * as signals from "/signals.js";
 import * as time from "/time.js";
 import * as cluster from "/cluster.js";
@@ -49,7 +50,7 @@ function showWanted() {
   if (reason) {
     why.select(reason);
   }
-  if (time.state()) {
+  if (time.state() && isShown(time.state())) {
     VIEWS[current].show(time.state(), time.isLive());
   }
   address.forget();
@@ -66,6 +67,9 @@ function shownAddress() {
 }
 
 let period = 0;
+
+// Whether a state can be shown: the points of its cycle are known.
+let isShown = () => false;
 
 function head(state, live) {
   const when = !live ? "replay" : state.finished ? (state.interrupted ? "ended early" : "finished") : time.stale() ? "old" : "live";
@@ -137,6 +141,7 @@ async function facts() {
 async function begin() {
   const run = await facts();
   period = run.period_us / 1000;
+  isShown = (state) => points.fit(run, state);
   setText(document.getElementById("title"), run.title || run.cluster);
   document.title = `${run.cluster} · Understudy`;
   const logOut = document.getElementById("log-out");
@@ -157,7 +162,21 @@ async function begin() {
   document.getElementById("tab-operate").hidden = !operate.has(run);
   banner.prepare(run);
   zone.prepare();
+  // Other points count in the cycle that is to be shown: the views are made anew, with the same signals.
+  const replaced = () => {
+    const renamed = signals.replacePoints(run);
+    for (const view of Object.values(VIEWS)) {
+      view.replacePoints?.(renamed);
+    }
+    document.getElementById("tab-operate").hidden = !operate.has(run);
+    VIEWS[current].enter?.();
+    show(time.state(), time.isLive());
+  };
   const show = (state, live) => {
+    if (!points.fit(run, state)) {
+      points.follow(run, state, replaced);
+      return;
+    }
     head(state, live);
     showPast(state);
     scenarioOver(state, run);

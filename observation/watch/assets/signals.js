@@ -18,6 +18,26 @@ export function prepare(run) {
       program[`${kind}s`].map((signal, index) => ({ ...signal, id: `${program.index}.${kind}.${index}`, program: program.index, kind })))));
 }
 
+const isPoint = (signal) => signal.kind === "input" || signal.kind === "output";
+
+// Other points count. Identifiers of signals become those of the same names; a signal that is gone has none.
+export function replacePoints(run) {
+  const before = byId;
+  all = all.filter((signal) => !isPoint(signal));
+  prepare(run);
+  return (ids) =>
+    ids.map((id) => {
+      const old = before.get(id);
+      return old && isPoint(old) ? all.find((signal) => signal.program === old.program && signal.kind === old.kind && signal.name === old.name)?.id : id;
+    }).filter(Boolean);
+}
+
+// A signal as the server is asked for it: by its name, whatever its number is by then.
+export function asked(id) {
+  const signal = byId.get(id);
+  return signal && isPoint(signal) ? `${signal.program}.${signal.kind}.${signal.name.replaceAll(",", ";")}` : id;
+}
+
 function take(signals) {
   all = [...all, ...signals].sort((one, other) => one.program - other.program);
   byId = new Map(all.map((signal) => [signal.id, signal]));
@@ -39,7 +59,7 @@ export function load() {
 
 // The programs that run have other variables.
 export function forget() {
-  all = all.filter((signal) => signal.kind === "input" || signal.kind === "output");
+  all = all.filter(isPoint);
   loading = null;
 }
 

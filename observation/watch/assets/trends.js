@@ -5,7 +5,7 @@ import { act, ask, toast } from "/ask.js";
 import { csvOf, csvOfColumns, reader, saveCsv, savePng } from "/download.js";
 import { el, keyed, setText } from "/element.js";
 import { keep, kept } from "/kept.js";
-import { chooser, find, load } from "/signals.js";
+import { asked, chooser, find, load } from "/signals.js";
 import { goTo, isLive, state } from "/time.js";
 import { bandPlugin, limitPlugin } from "/bands.js";
 import { heightOf, labelsOf, laneText, lanesOf, tickStep, ticks } from "/lanes.js";
@@ -26,6 +26,8 @@ let drawn = "";
 let last = 0;
 let later = 0;
 // A range is being dragged: the plot stays as it is.
+// Answers to questions of before other points are dropped.
+let generation = 0;
 let dragging = false;
 let dragged = false;
 
@@ -114,6 +116,14 @@ function picked() {
   refresh(true);
 }
 
+// Other points count: the same signals have other identifiers.
+export function replacePoints(renamed) {
+  chosen = renamed(chosen);
+  generation += 1;
+  answer = null;
+  drawn = "";
+}
+
 export async function enter() {
   drawn = "";
   // What this run does not have is left out.
@@ -199,7 +209,7 @@ async function refresh(now) {
     return;
   }
   const { from, to } = range();
-  const question = `signals=${encodeURIComponent(chosen.join(","))}&from=${from}&to=${to}`;
+  const question = `signals=${encodeURIComponent(chosen.map(asked).join(","))}&from=${from}&to=${to}`;
   if (question === drawn) {
     point();
     return;
@@ -221,9 +231,10 @@ async function refresh(now) {
   last = performance.now();
   drawn = question;
   const ids = [...chosen];
+  const before = generation;
   const found = await act(() => ask(`api/trends?${question}`));
   asking = false;
-  if (found && !dragging) {
+  if (found && !dragging && before === generation) {
     answer = { ...found, ids };
     draw();
   } else {

@@ -4,7 +4,7 @@ import { addressOf, changed } from "/address.js";
 import { act, ask } from "/ask.js";
 import { el, keyed, setAttribute, setText, valueText } from "/element.js";
 import { keep, kept } from "/kept.js";
-import { chooser, find, fullName, load } from "/signals.js";
+import { asked as askedFor, chooser, find, fullName, load } from "/signals.js";
 import { cycleParameter, isLive, state } from "/time.js";
 
 const MAXIMUM_SIGNALS = 100;
@@ -16,6 +16,8 @@ let chosen = [];
 let choice = null;
 let asking = false;
 let again = false;
+// Answers to questions of before other points are dropped.
+let generation = 0;
 let later = 0;
 let last = 0;
 
@@ -42,6 +44,12 @@ export const selection = () => ({ signals: chosen.join(",") });
 export function select(wanted) {
   chosen = (wanted.signals ?? "").split(",").filter(Boolean).slice(0, MAXIMUM_SIGNALS);
   choice.show();
+}
+
+// Other points count: the same signals have other identifiers.
+export function replacePoints(renamed) {
+  chosen = renamed(chosen);
+  generation += 1;
 }
 
 export async function enter() {
@@ -100,9 +108,12 @@ async function refresh(now) {
     again = false;
     last = performance.now();
     const asked = [...chosen];
-    const answer = await act(() => ask(`api/values?signals=${encodeURIComponent(asked.join(","))}&${cycleParameter()}`));
-    if (answer) {
-      fill(new Map(asked.map((signal, place) => [signal, answer.values[place]])), answer.cycle, answer.unknown);
+    const before = generation;
+    const names = asked.map(askedFor);
+    const answer = await act(() => ask(`api/values?signals=${encodeURIComponent(names.join(","))}&${cycleParameter()}`));
+    if (answer && before === generation) {
+      const unknown = asked.filter((_, place) => answer.unknown.includes(names[place]));
+      fill(new Map(asked.map((signal, place) => [signal, answer.values[place]])), answer.cycle, unknown);
     }
   } while (again && !isLive());
   asking = false;

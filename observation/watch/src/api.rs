@@ -35,6 +35,7 @@ const BODY_BYTES: usize = 4096;
 pub(crate) fn router(app: Arc<App>) -> Router {
     Router::new()
         .route("/api/run", get(facts::run))
+        .route("/api/points/{program}", get(facts::points))
         .route("/api/live", get(live::live))
         .route("/api/state", get(facts::state))
         .route("/api/events", get(events::events))

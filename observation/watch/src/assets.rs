@@ -48,6 +48,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "zone.js": SCRIPT,
     "values.js": SCRIPT,
     "signals.js": SCRIPT,
+    "points.js": SCRIPT,
     "trends.js": SCRIPT,
     "download.js": SCRIPT,
     "bands.js": SCRIPT,

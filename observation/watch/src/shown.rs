@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::Value;
 use understudy_bus::Quantiles;
 use understudy_cluster::{Controller, Priority};
-use understudy_journal::{ClocksApart, TimeOfDay};
+use understudy_journal::{ClocksApart, PointsInEffect, TimeOfDay};
 use understudy_remote_io::SignalInput;
 use understudy_typed::{Point, Points};
 use understudy_view::{
@@ -74,6 +74,8 @@ struct ShownProgram {
     name: String,
     /// Hash of the program that runs: with another one, its text and its variables are others.
     hash: Option<String>,
+    /// Hash of the version of the program by whose points this cycle is shown: the facts of the program have to be those of it.
+    points: Option<String>,
     source: &'static str,
     /// The station whose parity word the outputs were reconstructed from.
     word_of: Option<String>,
@@ -280,9 +282,12 @@ fn shown_program(
     index: usize,
     program: &ProgramSnapshot,
 ) -> ShownProgram {
-    let controllers = run.cluster().controllers();
-    let controller_of = controllers.get(index);
-    let interface = &run.cluster().controllers()[index].interface;
+    let of = ProgramId(index as u8);
+    let points = snapshot.points.versions().get(index);
+    let interface = snapshot.points.controller(of).map(|controller| &controller.interface);
+    let none = Points::default();
+    let inputs = interface.map_or(&none, |it| &it.inputs);
+    let outputs = interface.map_or(&none, |it| &it.outputs);
     let values = |points: &Points, bits: Option<&str>| {
         let bits = bits?;
         let values = points.iter();
@@ -293,9 +298,8 @@ fn shown_program(
     ShownProgram {
         index,
         name: program.program.clone(),
-        hash: run
-            .controller_at(ProgramId(index as u8), snapshot.cycle)
-            .map(|controller| controller.hash.to_string()),
+        hash: run.controller_at(of, snapshot.cycle).map(|controller| controller.hash.to_string()),
+        points: points.map(ToString::to_string),
         source: program.source.unwrap_or("unknown"),
         word_of: program.word_of.clone(),
         missing: program.missing,
@@ -303,12 +307,16 @@ fn shown_program(
         inputs: program.inputs.clone(),
         outputs: program.outputs.clone(),
         published: published.map(|word| word.sum.clone()),
-        input_values: values(&interface.inputs, program.inputs.as_deref()),
-        output_values: values(&interface.outputs, program.outputs.as_deref()),
-        published_values: values(&interface.outputs, published.map(|word| word.sum.as_str())),
-        signals: signals(run, index, program),
+        input_values: values(inputs, program.inputs.as_deref()),
+        output_values: values(outputs, program.outputs.as_deref()),
+        published_values: values(outputs, published.map(|word| word.sum.as_str())),
+        signals: signals(&snapshot.points, of, program),
         awaits_release: program.awaits_release,
-        forced: program.forces.iter().map(|force| shown_force(controller_of, force)).collect(),
+        forced: program
+            .forces
+            .iter()
+            .map(|force| shown_force(snapshot.points.controller(of), force))
+            .collect(),
         protection: program.protection.clone().map(|protection| ShownProtection {
             words: protection.text(),
             since_at: run.time_of(protection.since),
@@ -326,10 +334,12 @@ fn shown_program(
 }
 
 /// The signals of a program, as its newest sample has them.
-fn signals(run: &RunModel, index: usize, program: &ProgramSnapshot) -> Vec<ShownSignal> {
-    let interface = &run.cluster().controllers()[index].interface;
-    let declared = run.cluster().remote_ios().get(index);
-    let declared = declared.into_iter().flat_map(|remote_io| remote_io.signals());
+fn signals(points: &PointsInEffect, of: ProgramId, program: &ProgramSnapshot) -> Vec<ShownSignal> {
+    let Some((controller, remote_io)) = points.controller(of).zip(points.remote_io(of)) else {
+        return Vec::new();
+    };
+    let interface = &controller.interface;
+    let declared = remote_io.signals();
     let shown = declared.filter_map(|signal| {
         let SignalInput { place, valid, .. } = signal.input;
         let sampled = program.inputs.as_deref();

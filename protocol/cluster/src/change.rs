@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use understudy_cycle::{
     Agreement, Conversion, Fallback, FallbackChange, OnlineChange, Program, ProgramChange,
 };
+use understudy_executable::Interface;
 use understudy_typed::{Fault, Program as TypedProgram, Renamed, Successor};
 use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
@@ -22,7 +23,7 @@ use self::differences::{Difference, Points, differences};
 pub use self::error::ChangeError;
 pub use self::fallback::{ChangedFallback, FallbackText};
 pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_pairs, fates};
-pub use self::points::{ChangedPoints, FixedPoints, change_with_points};
+pub use self::points::{ChangedPoints, FixedPoints, change_with_points, same_point};
 pub use self::settings::ChangedSetting;
 pub use self::unfit::{PairReason, Unfit};
 use crate::canonical::points_hash;
@@ -80,11 +81,23 @@ impl OnlineChanges {
         }
     }
 
+    /// That with which it began.
+    pub fn first(&self) -> &Arc<Cluster> {
+        &self.clusters[0]
+    }
+
     /// The controller of a program where that is the one with this hash.
     pub fn controller(&self, program: ProgramId, hash: ProgramHash) -> Option<&Controller> {
-        let controllers =
-            self.clusters.iter().filter_map(|it| it.controllers().get(program.index()));
-        controllers.rev().find(|controller| controller.hash == hash)
+        self.cluster_with(program, hash)?.controllers().get(program.index())
+    }
+
+    /// The newest configuration in which a program is the one with this hash.
+    pub fn cluster_with(&self, program: ProgramId, hash: ProgramHash) -> Option<&Arc<Cluster>> {
+        let has_it = |cluster: &&Arc<Cluster>| {
+            let controller = cluster.controllers().get(program.index());
+            controller.is_some_and(|controller| controller.hash == hash)
+        };
+        self.clusters.iter().rev().find(has_it)
     }
 }
 
@@ -343,6 +356,47 @@ impl ChangeTexts {
 }
 
 impl Cluster {
+    /// The same cluster with a program of another configuration, with its points and what its remote I/O does with them: for views of a run in which the
+    /// programs change one after the other. It has the agreement and the texts of this one.
+    #[must_use]
+    pub fn with_program_of(&self, other: &Self, program: ProgramId) -> Self {
+        let place = program.index();
+        let mut cluster = self.clone();
+        let mut programs = cluster.programs.to_vec();
+        if let (Some(own), Some(new)) =
+            (cluster.controllers.get_mut(place), other.controllers.get(place))
+        {
+            own.code.clone_from(&new.code);
+            own.interface.clone_from(&new.interface);
+            own.hash = new.hash;
+        }
+        if let (Some(own), Some(new)) =
+            (cluster.remote_ios.get_mut(place), other.remote_ios.get(place))
+        {
+            own.inputs.clone_from(&new.inputs);
+            own.field.clone_from(&new.field);
+            own.fallback.clone_from(&new.fallback);
+        }
+        if let (Some(own), Some(new)) = (programs.get_mut(place), other.programs.get(place)) {
+            own.clone_from(new);
+        }
+        cluster.programs = programs.into();
+        cluster
+    }
+
+    /// The same cluster without the inputs and outputs of a program, where they are not known: for the same views.
+    #[must_use]
+    pub fn without_points_of(&self, program: ProgramId) -> Self {
+        let mut cluster = self.clone();
+        if let Some(controller) = cluster.controllers.get_mut(program.index()) {
+            controller.interface = Interface::default();
+        }
+        if let Some(remote_io) = cluster.remote_ios.get_mut(program.index()) {
+            remote_io.inputs.clear();
+        }
+        cluster
+    }
+
     /// The same cluster with the programs and settings of one of the two configurations of a change, as if its file named them.
     ///
     /// # Errors

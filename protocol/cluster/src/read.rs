@@ -74,6 +74,7 @@ use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
 use crate::code::Code;
 use crate::configuration::{FALLBACK, PROGRAM, configuration_text, fallback_text};
 use crate::file::{self, ClusterFile, ControllerSection};
+use crate::source::InputSource;
 
 /// The longest cluster file in bytes.
 pub const MAXIMUM_TEXT_BYTES: usize = 1 << 20;
@@ -149,11 +150,30 @@ fn with_sections(mut cluster: Cluster, text: &str) -> Cluster {
             let of = ("controller".to_owned(), name.clone());
             toml::Value::Table([of].into_iter().collect())
         });
-        let document = ("remote_io".to_owned(), toml::Value::Array(vec![section]));
-        let document: toml::Table = [document].into_iter().collect();
-        remote_io.section = document.to_string();
+        remote_io.section = section_text(section, &remote_io.inputs);
     }
     cluster
+}
+
+/// A section as text. Its inputs stand in the order of the file, which counts in the configuration; a table is written in the order of its keys.
+fn section_text(mut section: toml::Value, inputs: &[InputSource]) -> String {
+    let of = |key: &str, value: toml::Value| -> toml::Table {
+        [(key.to_owned(), value)].into_iter().collect()
+    };
+    let mut declared = match section.as_table_mut().and_then(|section| section.remove("inputs")) {
+        Some(toml::Value::Table(declared)) => declared,
+        _ => toml::Table::new(),
+    };
+    let mut text = of("remote_io", toml::Value::Array(vec![section])).to_string();
+    let first = inputs.iter().map(|input| &input.name);
+    let others: Vec<String> = declared.keys().cloned().collect();
+    for name in first.chain(&others) {
+        if let Some(input) = declared.remove(name) {
+            let inputs = toml::Value::Table(of(name, input));
+            text += &format!("\n{}", of("remote_io", of("inputs", inputs).into()));
+        }
+    }
+    text
 }
 
 /// A controller that was read as far as possible.

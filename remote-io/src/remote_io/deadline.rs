@@ -203,6 +203,7 @@ impl RemoteIo {
             source,
             word_of,
             missing,
+            points: self.named(Some(self.laid_out)),
             heard,
         });
     }

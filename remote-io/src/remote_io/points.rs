@@ -31,6 +31,13 @@ impl Sensed {
 }
 
 impl RemoteIo {
+    /// It says by which points it begins, to those who follow its events from the start; after [`Self::changed`].
+    #[must_use]
+    pub fn telling_points(mut self) -> Self {
+        self.report(Event::Points { version: self.laid_out });
+        self
+    }
+
     /// The way of the points from one version of its program to another one; nothing where they stay.
     fn passage(&self, from: ProgramHash, to: ProgramHash) -> Option<Passage<'_>> {
         let change = self.member.changing().change()?;

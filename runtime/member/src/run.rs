@@ -100,6 +100,7 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     if let Some((change, configurations)) = &started.restored {
         machine = machine.changed(change, *configurations);
     }
+    let machine = machine.telling_points();
     let Some(folder) = &options.retain else {
         let retention = Retention { is_missing: is_retentive, ..Retention::default() };
         return run(cluster, options, member, machine, field, (retention, started));

@@ -159,8 +159,9 @@ impl Account {
         }
         self.force_count += 1;
         if self.forces.len() < MAXIMUM_FORCES {
+            let signal = self.terms.present.members().signal(program, force.signal).cloned();
             let (force, to) = (force.clone(), None);
-            self.forces.push(DoneForce { program, force, from, to, refused });
+            self.forces.push(DoneForce { program, force, signal, from, to, refused });
         }
     }
 
@@ -262,7 +263,6 @@ impl Account {
                     referee.asked(write.input, write.value);
                 }
             }
-            RunEvent::ChangeLoaded { texts } => self.terms.learn(texts),
             RunEvent::Commanded { .. } | RunEvent::CommandRefused(_) => {}
             RunEvent::Interrupted => {
                 self.interrupted = true;
@@ -272,6 +272,7 @@ impl Account {
                 self.cycles = self.cycles.min(told.unwrap_or(0));
             }
             RunEvent::Journal { .. }
+            | RunEvent::ChangeLoaded { .. }
             | RunEvent::Checkpoint { .. }
             | RunEvent::Continues(_)
             | RunEvent::InEffect { .. }

@@ -42,6 +42,7 @@ fn applied(ms: u64, program: u8, source: Source) -> Record {
         source,
         word_of: None,
         missing: None,
+        points: None,
         heard: StationSet::EMPTY,
     };
     of(ms, Member::RemoteIo(ProgramId(program)), Happening::RemoteIo(event))

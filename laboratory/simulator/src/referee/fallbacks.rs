@@ -50,9 +50,9 @@ impl Referee {
         fallbacks.speaker = speaker;
     }
 
-    /// The fail-safe values of the remote I/O whose outputs were judged last, where they are known.
-    pub fn fail_safe(&self) -> Option<&Image> {
-        self.fallbacks.in_force().fallback.as_ref().map(|fallback| &fallback.fail_safe)
+    /// The fail-safe values of the remote I/O whose outputs were judged last, at the points that count, where they are known.
+    pub fn fail_safe(&self) -> Option<Image> {
+        self.fallback_in_force().map(|fallback| fallback.fail_safe)
     }
 
     /// The remote I/O runs this configuration from now on, with its settings: ramps to other fail-safe values begin where the outputs are.

@@ -101,6 +101,7 @@ fn applied(cycle: u64, output: bool, source: Source) -> Event {
         source,
         word_of: None,
         missing: None,
+        points: None,
         heard: StationSet::EMPTY,
     }
 }
@@ -389,9 +390,19 @@ fn outputs_recorded_after_those_of_a_successor_are_judged_by_their_own_cycle() {
     let (author, successor) = (Member::RemoteIo(ProgramId(0)), Member::Twin(ProgramId(0)));
     let sampled = |cycle: u64, input| sampled(cycle, &[true; 8][1..cycle as usize], input);
     let applied_of = |cycle, input, output, source| match applied(cycle, output, source) {
-        Event::Applied { moment, outputs, source, word_of, missing, heard, .. } => {
+        Event::Applied { moment, outputs, source, word_of, missing, points, heard, .. } => {
             let (sampled, driven) = (input, None);
-            Event::Applied { moment, sampled, outputs, driven, source, word_of, missing, heard }
+            Event::Applied {
+                moment,
+                sampled,
+                outputs,
+                driven,
+                source,
+                word_of,
+                missing,
+                points,
+                heard,
+            }
         }
         _ => unreachable!("outputs that were applied"),
     };

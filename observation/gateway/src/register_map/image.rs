@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use understudy_typed::{Elementary, Points};
-use understudy_view::{RunState, Snapshot, StationState, stored};
-use understudy_wire::Member;
+use understudy_typed::{Elementary, Point};
+use understudy_view::{ImageSide, RunState, Snapshot, StationState};
+use understudy_wire::{Member, ProgramId};
 
 use super::{Area, NUMBERS, OF_PROGRAM, PROGRAMS, RegisterMap, STATIONS, VERSION, registers_of};
 use crate::feed::Feed;
@@ -39,11 +39,35 @@ impl ProcessImage {
         ]
     }
 
+    /// The next place of a point: a BOOL is a bit, a number takes registers.
+    fn add(&mut self, point: &Point, side: ImageSide, stored: u64) {
+        if point.of == Elementary::Bool {
+            let bits = match side {
+                ImageSide::Inputs => &mut self.inputs,
+                ImageSide::Outputs => &mut self.coils,
+            };
+            return bits.push(stored != 0);
+        }
+        // A SINT keeps its sign.
+        let value = match point.of.is_signed() {
+            true => point.of.signed(stored) as u64,
+            false => stored,
+        };
+        let places = (0..registers_of(point)).rev();
+        self.registers.extend(places.map(|place| (value >> (16 * place)) as u16));
+    }
+
     /// What was added since then has no value.
     fn unknown_since(&mut self, before: [(Area, usize); 3]) {
         let added = before.into_iter().zip(self.lengths());
         let added = added.map(|((area, from), (_, to))| (area, from..to));
-        self.unknown.extend(added.filter(|(_, range)| !range.is_empty()));
+        for (area, range) in added.filter(|(_, range)| !range.is_empty()) {
+            let mut own = self.unknown.iter_mut().rev().filter(|(of, _)| *of == area);
+            match own.next() {
+                Some((_, last)) if last.end == range.start => last.end = range.end,
+                _ => self.unknown.push((area, range)),
+            }
+        }
     }
 }
 
@@ -117,27 +141,26 @@ impl RegisterMap {
         if self.numbers > 0 {
             image.registers.resize(NUMBERS, 0);
         }
-        for (interface, program) in self.interfaces.iter().zip(&snapshot.programs) {
-            let before = image.lengths();
-            let inputs = program.inputs.as_deref();
-            add_points(&interface.inputs, inputs, &mut image.inputs, &mut image.registers);
-            if inputs.is_none() {
-                image.unknown_since(before);
-            }
-            let before = image.lengths();
-            let outputs = program.outputs.as_deref();
-            add_points(&interface.outputs, outputs, &mut image.coils, &mut image.registers);
-            if outputs.is_none() {
-                image.unknown_since(before);
+        for (program, interface) in (0..).map(ProgramId).zip(&self.interfaces) {
+            let sides =
+                [(ImageSide::Inputs, &interface.inputs), (ImageSide::Outputs, &interface.outputs)];
+            for (point, side) in
+                sides.into_iter().flat_map(|(side, points)| points.iter().map(move |it| (it, side)))
+            {
+                let before = image.lengths();
+                let value = snapshot.stored(program, side, point);
+                image.add(point, side, value.unwrap_or_default());
+                // An online change may have taken the point away.
+                if value.is_none() {
+                    image.unknown_since(before);
+                }
             }
         }
         for target in &self.coils {
             let Member::RemoteIo(program) = target.member else {
                 continue;
             };
-            let program = snapshot.programs.get(program.index());
-            let inputs = program.and_then(|program| program.inputs.as_deref());
-            let value = inputs.and_then(|inputs| stored(&target.point, inputs));
+            let value = snapshot.stored(program, ImageSide::Inputs, &target.point);
             let before = image.lengths();
             image.coils.push(value == Some(1));
             if value.is_none() {
@@ -145,24 +168,6 @@ impl RegisterMap {
             }
         }
         image
-    }
-}
-
-/// The points of an image that is written as bits, such as `0110`: BOOLs as bits, numbers as registers; 0 where nothing is known.
-fn add_points(points: &Points, text: Option<&str>, bits: &mut Vec<bool>, registers: &mut Vec<u16>) {
-    for point in points {
-        let stored = text.and_then(|text| stored(point, text)).unwrap_or_default();
-        if point.of == Elementary::Bool {
-            bits.push(stored != 0);
-            continue;
-        }
-        // A SINT keeps its sign.
-        let value = match point.of.is_signed() {
-            true => point.of.signed(stored) as u64,
-            false => stored,
-        };
-        let places = (0..registers_of(point)).rev();
-        registers.extend(places.map(|place| (value >> (16 * place)) as u16));
     }
 }
 

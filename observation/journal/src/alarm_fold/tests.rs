@@ -157,6 +157,7 @@ fn journal(cluster: &Cluster, steps: &[Step]) -> Vec<(i64, Record)> {
                     source: Source::Direct,
                     word_of: None,
                     missing: *missing,
+                    points: None,
                     heard: StationSet::EMPTY,
                 })
             }

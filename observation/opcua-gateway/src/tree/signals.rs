@@ -4,7 +4,7 @@ use opcua::types::Variant;
 use understudy_cluster::{Controller, InputSource};
 use understudy_remote_io::OperatorInputKind;
 use understudy_typed::{Elementary, Point};
-use understudy_view::stored;
+use understudy_view::ImageSide;
 use understudy_wire::{Member, ProgramId};
 
 use super::{Kind, Tree, WritableInput};
@@ -33,10 +33,13 @@ impl Tree {
             let meaning = writable.as_ref().map_or_else(|| sampled(point), |(meaning, _)| *meaning);
             self.add(&name, kind_of(point.of), meaning, move |seen| {
                 let program = seen.program(place);
-                let image = program.and_then(|program| program.inputs.as_deref());
-                let failed = status.as_ref().and_then(|status| stored(status, image?));
+                let failed = status
+                    .as_ref()
+                    .and_then(|status| seen.stored(place, ImageSide::Inputs, status));
                 let trust = program.map(|it| trust::input(it, &own.name, failed == Some(1)));
-                seen.present(variant_of(&own, image), trust.unwrap_or_default())
+                let value = seen.stored(place, ImageSide::Inputs, &own);
+                let value = value.map(|stored| variant_of_stored(own.of, stored));
+                seen.present(value, trust.unwrap_or_default())
             });
             if let Some(added) = self.variables.last_mut() {
                 added.names = value_names(point);
@@ -52,9 +55,10 @@ impl Tree {
             };
             self.add(&name, kind_of(point.of), meaning, move |seen| {
                 let program = seen.program(place);
-                let image = program.and_then(|program| program.outputs.as_deref());
                 let trust = program.map(|program| trust::output(program, &own.name));
-                seen.present(variant_of(&own, image), trust.unwrap_or_default())
+                let value = seen.stored(place, ImageSide::Outputs, &own);
+                let value = value.map(|stored| variant_of_stored(own.of, stored));
+                seen.present(value, trust.unwrap_or_default())
             });
             if let Some(added) = self.variables.last_mut() {
                 added.names = value_names(point);
@@ -190,11 +194,6 @@ fn kind_of(of: Elementary) -> Kind {
         of if of.is_signed() => Kind::Int64,
         _ => Kind::UInt64,
     }
-}
-
-/// The value of a point in an image such as `0110`.
-fn variant_of(point: &Point, image: Option<&str>) -> Option<Variant> {
-    Some(variant_of_stored(point.of, stored(point, image?)?))
 }
 
 fn variant_of_stored(of: Elementary, value: u64) -> Variant {

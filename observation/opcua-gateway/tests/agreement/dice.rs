@@ -233,6 +233,7 @@ impl Dice<'_> {
             source,
             word_of: (source == Source::Reconstructed).then(|| self.station()),
             missing,
+            points: None,
             heard,
         })
     }

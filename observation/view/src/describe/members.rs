@@ -128,6 +128,7 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
     Configured(configurations) => "configured" Notice configured_text(*configurations);
     ProgramChanged { to, .. } => "program-changed" Notice format!("its program is {to} from this cycle on");
+    Points { version } => "points" Info format!("begins with the inputs and outputs of the program {version}");
     PointsChanged { to, .. } => "points-changed" Notice format!("its inputs and outputs are those of the program {to} from this cycle on");
     PointsUnknown { version, .. } => "points-unknown" Alarm format!(
         "it does not have the inputs and outputs of the program {version} that runs: it samples nothing and drives the fail-safe values; give `prepare` again"

@@ -6,30 +6,33 @@ use std::ops::Deref;
 use understudy_journal::{Cycles, Happening, Members, NamedSignal, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_typed::{Declared, Elementary};
-use understudy_wire::{Force, Image, Member, PointValue, ProgramId, SignalPlace, Write, WriteId};
+use understudy_wire::{Force, Image, Member, PointValue, ProgramId, SignalPlace, WriteId};
 
 use crate::value::{is_declared, stored_text};
 
 /// Writes that are remembered: their outcomes come within some cycles.
 const MOST: usize = 256;
 
-/// The newest writes: the record of an outcome has the identifier of its write only.
+/// The newest writes in words, `speed = 120.0 mm/s of anna`, by the points of their time: the record of an outcome has the identifier of its write only.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Writes(VecDeque<Write>);
+pub(crate) struct Writes(VecDeque<(WriteId, String)>);
 
 impl Writes {
-    /// Takes the next record of the run.
-    pub(crate) fn note(&mut self, record: &Record) {
+    /// Takes the next record of the run, with the names that count.
+    pub(crate) fn note(&mut self, record: &Record, members: &Members) {
         if let Happening::RemoteIo(RemoteIoEvent::Written { write, .. }) = &record.event {
             if self.0.len() == MOST {
                 self.0.pop_front();
             }
-            self.0.push_back(write.clone());
+            let place = SignalPlace::Input(write.input);
+            let assignment = assignment(record.member, place, write.value, members);
+            self.0.push_back((write.id, format!("{assignment} of {}", write.owner)));
         }
     }
 
-    fn find(&self, id: WriteId) -> Option<&Write> {
-        self.0.iter().rev().find(|write| write.id == id)
+    fn find(&self, id: WriteId) -> Option<&str> {
+        let found = self.0.iter().rev().find(|(write, _)| *write == id);
+        found.map(|(_, text)| text.as_str())
     }
 }
 
@@ -69,14 +72,7 @@ impl Names<'_> {
 
     /// `speed = 120.0 mm/s of anna`, where the write is remembered.
     pub(super) fn write(&self, id: WriteId) -> String {
-        match self.writes.find(id) {
-            Some(write) => {
-                let place = SignalPlace::Input(write.input);
-                let assignment = assignment(self.by, place, write.value, self.members);
-                format!("{assignment} of {}", write.owner)
-            }
-            None => "a written value".to_owned(),
-        }
+        self.writes.find(id).unwrap_or("a written value").to_owned()
     }
 
     /// The program whose inputs and outputs the reporting member has.

@@ -34,6 +34,8 @@ pub struct Sampled {
 pub struct Driven {
     /// The remote I/O that drove them: the first one of the program or its twin.
     pub by: Member,
+    /// The version of the program whose points these inputs and outputs have.
+    pub points: ProgramHash,
     /// y(i) as the device gets it, with the forced values.
     pub outputs: Image,
     /// y(i) before forces.

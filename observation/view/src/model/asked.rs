@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use understudy_cluster::{Cluster, Controller};
-use understudy_journal::{Members, SourceCounts, TimeOfDay};
+use understudy_cluster::{Cluster, Controller, same_point};
+use understudy_journal::{Members, PointsInEffect, Present, SourceCounts, TimeOfDay};
 use understudy_ladder::Evaluation;
-use understudy_typed::Trace;
-use understudy_wire::{Member, Moment, ProgramId, StationId};
+use understudy_typed::{Point, Trace};
+use understudy_wire::{Member, Moment, ProgramHash, ProgramId, StationId};
 
 use super::{Counters, Model, SentTurn};
 use crate::alarm::Alarm;
@@ -30,7 +30,7 @@ impl Model {
 
     /// Names of the members.
     pub fn members(&self) -> &Members {
-        &self.members
+        self.present.members()
     }
 
     /// The newest cycle that was decided, from the origin of the run.
@@ -211,11 +211,7 @@ impl Model {
         let program = history.program();
         let hash = history.program_at(place);
         let version = self.versions.get(program.index()).and_then(|it| it.find(hash));
-        version.ok_or_else(|| ViewError::NoState {
-            cycle: history.steps()[place].cycle,
-            program: self.program_name(program).to_owned(),
-            reason: NOT_KNOWN.to_owned(),
-        })
+        version.ok_or_else(|| self.not_known(program, history.steps()[place].cycle))
     }
 
     /// The program that runs, or that with which the run began where that one is not known.
@@ -238,6 +234,57 @@ impl Model {
         self.version_in(program, cycle).map(Version::controller)
     }
 
+    /// A program as the version by whose points its inputs and outputs of a cycle are named, where nothing is known of the cycle those that count now;
+    /// nothing where they are not known.
+    pub fn points_at(&self, program: ProgramId, cycle: Option<i64>) -> Option<&Controller> {
+        let version = self.points_version(program, cycle)?;
+        self.present.controller_of(program, version)
+    }
+
+    /// The version of a program by whose points its inputs and outputs of a cycle are named.
+    pub(crate) fn points_version(
+        &self,
+        program: ProgramId,
+        cycle: Option<i64>,
+    ) -> Option<ProgramHash> {
+        let step = cycle.and_then(|cycle| self.deadline(program, cycle));
+        let driven = step.and_then(|step| step.driven.as_ref());
+        let counts = || self.present.versions().get(program.index()).copied();
+        driven.map(|driven| driven.points).or_else(counts)
+    }
+
+    /// A program as the version by whose points its outputs of a moment of the cluster are named; nothing where that is not known.
+    pub(crate) fn points_of(&self, program: ProgramId, moment: Moment) -> Option<&Controller> {
+        let mut steps = self.history(program)?.steps().iter().rev();
+        let step = steps.find(|step| step.moment == moment && !step.void);
+        let of_step = step.and_then(|step| {
+            let driven = step.driven.as_ref().map(|driven| driven.points);
+            step.sampled.as_ref().map(|sampled| sampled.program).or(driven)
+        });
+        let version = of_step.or_else(|| self.points_version(program, None))?;
+        self.present.controller_of(program, version)
+    }
+
+    /// The stored value of the input that a point of another scan is in the scan of the step at `place`; nothing where its program has none, or the sample is not
+    /// known.
+    pub(crate) fn input_at(&self, history: &History, place: usize, point: &Point) -> Option<u64> {
+        let sampled = history.steps()[place].sampled.as_ref()?;
+        let version = self.version_at(history, place).ok()?;
+        let own = same_point(point, &version.controller().interface.inputs)?;
+        Some(own.get(sampled.inputs.words()))
+    }
+
+    /// The points by which the inputs and outputs of a cycle are named.
+    pub fn points_in(&self, cycle: Option<i64>) -> PointsInEffect {
+        let versions = self.program_ids().filter_map(|program| self.points_version(program, cycle));
+        self.present.with(&versions.collect::<Vec<_>>())
+    }
+
+    /// The points that count after the newest record.
+    pub fn present(&self) -> &Present {
+        &self.present
+    }
+
     /// The sample of a step, where the state before it is known.
     pub(crate) fn sampled_at<'h>(
         &self,
@@ -258,6 +305,15 @@ impl Model {
                 reason: reason.to_owned(),
             }
         })
+    }
+
+    /// An online change has brought a program that the journal does not contain.
+    pub(crate) fn not_known(&self, program: ProgramId, cycle: i64) -> ViewError {
+        ViewError::NoState {
+            cycle,
+            program: self.program_name(program).to_owned(),
+            reason: NOT_KNOWN.to_owned(),
+        }
     }
 
     /// The run has another program in the place of one after a cycle than the one that is asked for.
@@ -284,6 +340,6 @@ impl Model {
     }
 
     pub(crate) fn program_name(&self, program: ProgramId) -> &str {
-        crate::describe::program_name(program, &self.members)
+        crate::describe::program_name(program, self.members())
     }
 }

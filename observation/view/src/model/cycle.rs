@@ -269,9 +269,9 @@ impl Model {
         Holders {
             mode: self.cluster.agreement().mode,
             widths: self
-                .cluster
-                .controllers()
-                .iter()
+                .program_ids()
+                .zip(self.cluster.controllers())
+                .map(|(program, first)| self.points_at(program, Some(cycle)).unwrap_or(first))
                 .map(|controller| controller.interface.outputs.width())
                 .collect(),
             holds: holds.collect(),

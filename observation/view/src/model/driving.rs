@@ -34,7 +34,7 @@ impl Model {
         for program in samples.iter() {
             let process = self.changes.now().process(self.changes.now().driver(program));
             if process.is_none_or(|process| process.is_running()) {
-                let name = self.members.name(Member::RemoteIo(program)).to_owned();
+                let name = self.members().name(Member::RemoteIo(program)).to_owned();
                 // One that was suspended passes the deadline first that it missed.
                 let now = self.cycles.latest().map_or(cycle, |latest| latest.max(cycle));
                 self.alarms.over(&(name, NOT_DRIVEN), now);
@@ -53,7 +53,7 @@ impl Model {
     fn values_unknown(&mut self, member: Member, cycle: i64) {
         if let Member::RemoteIo(program) = member {
             let changes = self.process_alarms.fold.forget(program);
-            let name = self.members.name(member).to_owned();
+            let name = self.members().name(member).to_owned();
             self.process_alarms_changed(&name, cycle, &changes);
         }
     }
@@ -68,9 +68,9 @@ impl Model {
 
     /// A remote I/O whose process does not execute drives nothing.
     pub(super) fn not_driven(&mut self, program: ProgramId, cycle: i64, reason: &str) -> String {
-        let of = program_name(program, &self.members);
+        let of = program_name(program, self.members());
         let text = format!("{of}: no remote I/O drives the outputs, because {reason}");
-        let name = self.members.name(Member::RemoteIo(program)).to_owned();
+        let name = self.members().name(Member::RemoteIo(program)).to_owned();
         self.alarms.raise_critical((name, NOT_DRIVEN), cycle, text.clone());
         text
     }
@@ -85,24 +85,24 @@ impl Model {
             return;
         }
         for program in (0..self.cluster.controllers().len() as u8).map(ProgramId) {
-            let of = program_name(program, &self.members);
+            let of = program_name(program, self.members());
             let text = format!(
                 "{of}: it is not known whether the outputs are driven, because nothing is received from any member: they, or the network to this viewer, have failed"
             );
-            let name = self.members.name(Member::RemoteIo(program)).to_owned();
+            let name = self.members().name(Member::RemoteIo(program)).to_owned();
             self.alarms.raise_critical((name, NOT_DRIVEN), cycle, text);
         }
     }
 
     fn gives_no_sign(&mut self, record: &Record, program: ProgramId, cycle: i64) {
-        let name = self.members.name(Member::RemoteIo(program)).to_owned();
+        let name = self.members().name(Member::RemoteIo(program)).to_owned();
         let process = self.changes.now().process(Member::RemoteIo(program));
         let is_paired = self.is_paired(program);
         if !is_paired && process.is_some_and(|process| !process.is_running()) {
             return;
         }
         let reason = if is_paired {
-            let twin = self.members.name(Member::Twin(program));
+            let twin = self.members().name(Member::Twin(program));
             format!("neither {name} nor {twin} samples, as far as stations receive them")
         } else {
             format!("{name} reports nothing, and no station receives its samples")

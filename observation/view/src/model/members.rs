@@ -114,7 +114,7 @@ impl Model {
         };
         let refusal = Refusal { by: record.name.clone(), other, odd };
         self.refusals.insert(refusal);
-        let name = self.members.name(odd).to_owned();
+        let name = self.members().name(odd).to_owned();
         let text = odd_configuration_text(&name, &theirs, &right);
         self.alarms.raise((name, REFUSED), cycle, text);
     }
@@ -127,7 +127,7 @@ impl Model {
 
     /// The process of a member has begun or ended: it refuses no member.
     pub(super) fn refuses_none(&mut self, member: Member, cycle: i64) {
-        let name = self.members.name(member).to_owned();
+        let name = self.members().name(member).to_owned();
         self.refusals_end(&|refusal| refusal.by == name, cycle);
     }
 
@@ -137,7 +137,7 @@ impl Model {
         let over: BTreeSet<Refusal> = over;
         for Refusal { odd, .. } in over {
             if !self.refusals.iter().any(|refusal| refusal.odd == odd) {
-                self.alarms.over(&(self.members.name(odd).to_owned(), REFUSED), cycle);
+                self.alarms.over(&(self.members().name(odd).to_owned(), REFUSED), cycle);
             }
         }
     }
@@ -252,11 +252,11 @@ impl Model {
             }
             HostEvent::DuplicateFound { member } => {
                 let text = self.described(record).text;
-                let subject = (self.members.name(*member).to_owned(), "duplicate");
+                let subject = (self.members().name(*member).to_owned(), "duplicate");
                 self.alarms.raise(subject, cycle, text);
             }
             HostEvent::DuplicateGone { member } => {
-                let subject = (self.members.name(*member).to_owned(), "duplicate");
+                let subject = (self.members().name(*member).to_owned(), "duplicate");
                 self.alarms.over(&subject, cycle);
             }
             HostEvent::LinkFailed { network, .. } => {

@@ -88,7 +88,7 @@ impl Model {
     }
 
     fn links_changed(&mut self, member: Member, cycle: i64) {
-        let subject = (self.members.name(member).to_owned(), LINK_FAILED);
+        let subject = (self.members().name(member).to_owned(), LINK_FAILED);
         let links = self.networks.links.get(&member).into_iter().flatten();
         let texts: Vec<&str> = links.map(|(_, text)| text.as_str()).collect();
         if texts.is_empty() {
@@ -156,7 +156,7 @@ impl Model {
         let all: Vec<(Member, Member)> = lost.into_iter().chain(impaired).collect();
         let (from, to) = *all.first()?;
         let of_all = |member: Member| all.iter().all(|&(from, to)| from == member || to == member);
-        let name = |member| self.members.name(member);
+        let name = |member| self.members().name(member);
         let whom = if all.len() == 1 {
             format!("from {} to {}", name(from), name(to))
         } else if let Some(member) = [from, to].into_iter().find(|&member| of_all(member)) {
@@ -165,7 +165,7 @@ impl Model {
             let affected: BTreeSet<Member> =
                 all.iter().flat_map(|&(from, to)| [from, to]).collect();
             let names: Vec<&str> = affected.into_iter().map(name).collect();
-            match names.len() == self.members.iter().len() {
+            match names.len() == self.members().iter().len() {
                 true => "between any members".to_owned(),
                 false => format!("between {}", listed(&names)),
             }

@@ -38,7 +38,7 @@ impl Model {
     pub(super) fn driver_name(&self, program: ProgramId, cycle: i64) -> &str {
         let step = self.deadline(program, cycle);
         let own = step.map(|step| self.driver_at(program, step));
-        self.members.name(own.unwrap_or_else(|| self.standing(cycle).driver(program)))
+        self.members().name(own.unwrap_or_else(|| self.standing(cycle).driver(program)))
     }
 
     /// The member as which it reports: both remote I/Os of a program report as one.
@@ -79,7 +79,7 @@ impl Model {
         match event {
             RemoteIoEvent::PartChanged { part: Part::Author, .. } => {
                 let before = member.partner().unwrap_or(member);
-                let names = [before, member].map(|one| self.members.name(one));
+                let names = [before, member].map(|one| self.present.members().name(one));
                 for name in names {
                     self.alarms.all_over(name, &[PARTNER_LOST, INPUT_MODULES], cycle);
                 }
@@ -133,7 +133,7 @@ impl Model {
         if inputs.is_empty() {
             return self.alarms.over(&subject, cycle);
         }
-        let text = modules_text(record.member, &inputs, &self.members);
+        let text = modules_text(record.member, &inputs, self.members());
         self.alarms.replace(subject, cycle, text, asks_again);
     }
 }

@@ -85,8 +85,9 @@ impl Model {
             track.served =
                 is_provable(deadlines.source) || before.direct > 0 || before.reconstructed > 0;
             if deadlines.source == Source::FailSafe && track.served {
-                let remote_io = self.members.name(Member::RemoteIo(program));
-                let text = format!("{}: fail-safe outputs", program_name(program, &self.members));
+                let remote_io = self.present.members().name(Member::RemoteIo(program));
+                let text =
+                    format!("{}: fail-safe outputs", program_name(program, self.present.members()));
                 self.alarms.now_ns = deadlines.since_ns;
                 self.alarms.raise_critical(
                     (remote_io.to_owned(), FAIL_SAFE),

@@ -60,13 +60,16 @@ impl ProgramTrack {
     }
 }
 
-/// Alarms of questions to the operator about a state: they end with the program's state known.
-const QUESTIONS: [&str; 2] = ["disputed", "configuration-disputed"];
+/// The alarm of a remote I/O that has not loaded the points of the program that runs.
+pub(super) const POINTS_UNKNOWN: &str = "points-unknown";
+
+/// Alarms about a state that its remote I/O does not continue from, such as questions to the operator: they end with the program's state known.
+const QUESTIONS: [&str; 3] = ["disputed", "configuration-disputed", POINTS_UNKNOWN];
 
 impl Model {
     pub(super) fn remote_io(&mut self, record: &Record, program: ProgramId, event: &RemoteIoEvent) {
         let place = program.index();
-        if place >= self.programs.len() || !stop::fits(&self.cluster, program, event) {
+        if place >= self.programs.len() || !stop::fits(self.present.controller(program), event) {
             self.left_out += 1;
             return;
         }
@@ -110,6 +113,7 @@ impl Model {
                 self.applied(record, program, cycle, *moment, event);
                 return;
             }
+            RemoteIoEvent::Points { .. } => return,
             _ => {}
         }
         self.pair_changed(record, member, program, cycle, event);
@@ -174,6 +178,10 @@ impl Model {
                 alarm = Some(CHANGE_TAKEN_BACK);
                 None
             }
+            RemoteIoEvent::PointsUnknown { .. } => {
+                alarm = Some(POINTS_UNKNOWN);
+                None
+            }
             // The engineer has moved the change on.
             RemoteIoEvent::Configured(configurations) => {
                 self.alarms.all_over(&record.name, &[CHANGE_TAKEN_BACK], cycle);
@@ -203,7 +211,10 @@ impl Model {
                 self.refusal_ends(&record.name, *member, cycle);
                 None
             }
-            RemoteIoEvent::Forced { force, .. } => own(ProgramChange::Forced(force.clone())),
+            RemoteIoEvent::Forced { force, .. } => {
+                let points = self.points_version(program, None).unwrap_or_default();
+                own(ProgramChange::Forced(force.clone(), points))
+            }
             RemoteIoEvent::Unforced { signal, .. } => own(ProgramChange::Unforced(*signal)),
             RemoteIoEvent::SignalValidity { input, valid, .. } => {
                 own(ProgramChange::Validity(*input, *valid))
@@ -223,7 +234,7 @@ impl Model {
 
     /// The same stations may be accused by the remote I/Os of several programs.
     fn accused(&mut self, record: &Record, program: ProgramId, accused: StationSet, cycle: i64) {
-        let names = accused.iter().map(|station| self.members.name(Member::Station(station)));
+        let names = accused.iter().map(|station| self.members().name(Member::Station(station)));
         let subject = (names.collect::<Vec<_>>().join(" and "), VALUE_FAULT);
         let text = self.described(record).text;
         self.alarms.concerns(&subject, Some(program), cycle, text);
@@ -249,7 +260,7 @@ impl Model {
             _ => return,
         };
         let texts =
-            forced.iter().map(|forced| force_text(record.member, &forced.force, &self.members));
+            forced.iter().map(|forced| force_text(record.member, &forced.force, self.members()));
         let text = texts.collect::<Vec<_>>().join("; ");
         self.alarms.replace(subject, cycle, text, asks_again);
     }
@@ -337,7 +348,7 @@ impl Model {
             return;
         };
         let source = *source;
-        let from = source_text(source, *word_of, *missing, &self.members);
+        let from = source_text(source, *word_of, *missing, self.members());
         let text = format!("its outputs are {from}");
         let level = match source {
             Source::Direct | Source::Reconstructed => Level::Notice,
@@ -351,7 +362,7 @@ impl Model {
                 Some(missing) => missing_text(*missing).to_owned(),
                 None => "no output was provable".to_owned(),
             });
-            let of = program_name(program, &self.members);
+            let of = program_name(program, self.members());
             let text = format!("{of}: fail-safe outputs, because {why}");
             self.alarms.raise_critical(subject, cycle, text);
         } else {
@@ -393,7 +404,7 @@ impl Model {
             .station_ids()
             .filter(|station| !heard.contains(*station) && could_prove(station))
             .collect();
-        let names = away.iter().map(|station| self.members.name(Member::Station(*station)));
+        let names = away.iter().map(|station| self.members().name(Member::Station(*station)));
         let names: Vec<&str> = names.collect();
         let verb = if names.len() == 1 { "is" } else { "are" };
         let newest = away.iter().filter_map(|station| self.silenced(*station));

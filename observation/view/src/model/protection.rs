@@ -8,6 +8,7 @@ use understudy_wire::{Member, OrderRefusal, ProgramId, ProgramSet, StationId, St
 
 use super::Model;
 use super::pairs::{INPUT_MODULES, PARTNER_LOST};
+use super::programs::POINTS_UNKNOWN;
 use super::silence::{NOT_RECEIVED, Silence};
 use super::standing::{Change, ProgramChange, Standing};
 use crate::alarm::{STATE_LOST, Subject, UNPROTECTED};
@@ -56,9 +57,16 @@ impl Model {
     /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over. A new one says so if its field
     /// fails.
     pub(super) fn remote_io_is_new(&mut self, member: Member, program: ProgramId) {
-        let name = self.members.name(member).to_owned();
-        let over =
-            [STATE_LOST, PARTNER_LOST, INPUT_MODULES, "forced", "field-lost", "field-contested"];
+        let name = self.members().name(member).to_owned();
+        let over = [
+            STATE_LOST,
+            PARTNER_LOST,
+            INPUT_MODULES,
+            POINTS_UNKNOWN,
+            "forced",
+            "field-lost",
+            "field-contested",
+        ];
         self.alarms.all_over(&name, &over, self.cycles.of(None));
         if let Some(history) = self.histories.get_mut(program.index()) {
             history.starts_again();
@@ -98,7 +106,7 @@ impl Model {
                     since: cycle,
                     newest: newest.map(|newest| newest.cycle.0),
                     holder: holder
-                        .map(|holder| self.members.name(Member::Station(holder)).to_owned()),
+                        .map(|holder| self.members().name(Member::Station(holder)).to_owned()),
                     age_cycles: age.and_then(|age| u64::try_from(age).ok()).filter(is_old),
                     asks: *asks,
                     reason: asked_because(*reason),
@@ -231,7 +239,7 @@ impl Model {
         let proves: StationSet = self.provers(program).collect();
         let slots = self.cluster.agreement().schedule.spare_slots();
         let lacking = self.station_ids().filter_map(|id| {
-            let name = self.members.name(Member::Station(id));
+            let name = self.members().name(Member::Station(id));
             let known = reported.lacking.iter().find(|one| one.station == name);
             if !proves.contains(id) {
                 return known.cloned();
@@ -263,7 +271,7 @@ impl Model {
     }
 
     fn joining(&self, station: StationId) -> LackingStation {
-        let station = self.members.name(Member::Station(station)).to_owned();
+        let station = self.members().name(Member::Station(station)).to_owned();
         let text = format!("{station} requests the state");
         LackingStation { station, reason: JOINING, link: None, text }
     }
@@ -276,7 +284,7 @@ impl Model {
         state: StationState,
         cycles: RangeInclusive<i64>,
     ) -> LackingStation {
-        let name = self.members.name(Member::Station(station));
+        let name = self.members().name(Member::Station(station));
         let remote_io = self.driver_name(program, *cycles.end());
         let others = self.program_ids().filter(|other| *other != program);
         let others = others.filter_map(|other| self.heard_in(other, cycles.clone()));
@@ -304,7 +312,7 @@ impl Model {
         cycles: RangeInclusive<i64>,
     ) -> LackingStation {
         let station = lacking.station;
-        let name = self.members.name(Member::Station(station));
+        let name = self.members().name(Member::Station(station));
         let remote_io = self.driver_name(program, *cycles.end());
         let mut link = None;
         let (reason, text) = match lacking.reason {

@@ -1,8 +1,5 @@
 //! What the laboratory does, and what it sees of the processes that it runs.
 
-use std::sync::Arc;
-
-use understudy_cycle::OnlineChange;
 use understudy_journal::{Action, Command, Process, Record, RunEvent};
 use understudy_wire::Member;
 
@@ -29,7 +26,7 @@ impl Model {
         self.fold_process_alarms(record, cycle);
         match event {
             RunEvent::Started { member } => {
-                let name = self.members.name(*member).to_owned();
+                let name = self.members().name(*member).to_owned();
                 self.process_is(*member, Process::Running, cycle);
                 self.done(*member, format!("{name} is started"), Some(false), cycle);
                 self.alarms.over(&(name.clone(), ENDED), cycle);
@@ -37,7 +34,7 @@ impl Model {
             }
             RunEvent::Fault { action, member, .. } => self.fault(*action, *member, cycle),
             RunEvent::Ended { member, how, .. } => {
-                let name = self.members.name(*member).to_owned();
+                let name = self.members().name(*member).to_owned();
                 let text = format!("{name} ended unexpectedly: {how}");
                 self.process_is(*member, Process::Ended, cycle);
                 self.done(*member, text.clone(), Some(true), cycle);
@@ -100,11 +97,6 @@ impl Model {
             RunEvent::ChangeLoaded { texts } => {
                 let loaded = ChangeReport::Loaded(LoadedChange::of(texts));
                 self.changes.push(cycle, Change::Online(loaded));
-                if let Some(change) = self.online_changes.load(texts) {
-                    self.learn_programs(&change);
-                    let change = Arc::new(change);
-                    self.histories.iter_mut().for_each(|history| history.learn(&change));
-                }
             }
             RunEvent::Commanded { .. }
             | RunEvent::CommandRefused(_)
@@ -114,19 +106,6 @@ impl Model {
             | RunEvent::InEffect { .. } => {}
         }
         self.happened(record, cycle, None);
-    }
-
-    /// Scans are explained by the programs of a change too.
-    fn learn_programs(&mut self, change: &OnlineChange) {
-        for changed in &change.programs {
-            let Some(versions) = self.versions.get_mut(changed.program.index()) else {
-                continue;
-            };
-            for hash in [changed.before.hash, changed.after.hash] {
-                let found = self.online_changes.controller(changed.program, hash);
-                found.into_iter().for_each(|controller| versions.learn(controller));
-            }
-        }
     }
 
     fn fault(&mut self, action: Action, member: Member, cycle: i64) {
@@ -143,12 +122,12 @@ impl Model {
         if let (Member::RemoteIo(program), Some(what)) = (member, what)
             && !self.is_paired(program)
         {
-            let reason = format!("{} {what}", self.members.name(member));
+            let reason = format!("{} {what}", self.members().name(member));
             self.not_driven(program, cycle, &reason);
         }
         let runs = self.changes.now().process(member).is_none_or(Process::is_running);
         let silences = silences(action).filter(|silences| *silences || runs);
-        self.done(member, fault_text(action, member, &self.members), silences, cycle);
+        self.done(member, fault_text(action, member, self.members()), silences, cycle);
     }
 
     fn process_is(&mut self, member: Member, process: Process, cycle: i64) {

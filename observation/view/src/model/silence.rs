@@ -100,7 +100,7 @@ impl Model {
             matches!(state, StationState::Killed | StationState::Ended | StationState::Suspended)
         };
         let silent = self.station_ids().filter(|station| !is_down(*station));
-        let names = silent.map(|station| self.members.name(Member::Station(station)));
+        let names = silent.map(|station| self.members().name(Member::Station(station)));
         let names: Vec<&str> = names.collect();
         (names.len() > 1).then_some(names)
     }

@@ -95,7 +95,9 @@ impl Model {
                     let flagged = self.spares.flagged.iter();
                     let later =
                         flagged.filter(move |((by, _), at)| *by == member && **at > since_ns);
-                    later.map(|((_, slot), _)| self.members.name(Member::Station(*slot)).to_owned())
+                    later.map(|((_, slot), _)| {
+                        self.members().name(Member::Station(*slot)).to_owned()
+                    })
                 });
                 let flagged_slots: BTreeSet<String> = flagged.collect();
                 SpareSnapshot {

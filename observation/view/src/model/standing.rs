@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use understudy_journal::Process;
-use understudy_wire::{Force, Member, ProgramId, ProgramSet, SignalPlace, StationId, StationSet};
+use understudy_wire::{
+    Force, Member, ProgramHash, ProgramId, ProgramSet, SignalPlace, StationId, StationSet,
+};
 
 use crate::online_change::{ChangeReport, ChangeStanding};
 use crate::protection::{LostState, Protection};
@@ -13,6 +15,8 @@ use crate::station::StationStanding;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ForcedSignal {
     pub(crate) force: Force,
+    /// The version of the program whose point it is.
+    pub(crate) points: ProgramHash,
     /// The cycle in which it was given.
     pub(crate) since: i64,
 }
@@ -342,7 +346,9 @@ pub(super) enum ProgramChange {
     Released,
     Excluded(StationSet),
     Readmitted(StationId),
-    Forced(Force),
+    /// Other points count: what was said of places is void.
+    Points,
+    Forced(Force, ProgramHash),
     Unforced(SignalPlace),
     Validity(u16, bool),
     /// The modules of an input agree.
@@ -370,9 +376,15 @@ impl ProgramChange {
             }
             Self::Excluded(stations) => own.excluded = own.excluded.or(*stations),
             Self::Readmitted(station) => own.excluded.remove(*station),
-            Self::Forced(force) => {
+            Self::Points => {
+                own.forced.clear();
+                own.validity.clear();
+                own.modules.clear();
+            }
+            Self::Forced(force, points) => {
                 own.forced.retain(|other| other.force.signal != force.signal);
-                own.forced.push(ForcedSignal { force: force.clone(), since: cycle });
+                let (force, points) = (force.clone(), *points);
+                own.forced.push(ForcedSignal { force, points, since: cycle });
             }
             Self::Unforced(signal) => own.forced.retain(|other| other.force.signal != *signal),
             Self::Validity(input, valid) => {

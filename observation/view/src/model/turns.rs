@@ -90,7 +90,7 @@ impl Model {
     }
 
     fn compared(&mut self, station: StationId, moment: Moment, wrong: Option<String>) {
-        let name = self.members.name(Member::Station(station)).to_owned();
+        let name = self.members().name(Member::Station(station)).to_owned();
         let cycle = self.cycles.of(Some(moment));
         let subject = (name.clone(), "word-differs");
         match wrong {

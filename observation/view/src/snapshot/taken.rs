@@ -3,8 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
+use understudy_cluster::Controller;
 use understudy_cycle::Mode;
-use understudy_journal::{Process, SourceCounts, source_word};
+use understudy_executable::Interface;
+use understudy_journal::{PointsInEffect, Process, SourceCounts, source_word};
 use understudy_remote_io::Missing;
 use understudy_typed::Elementary;
 use understudy_wire::{Member, ProgramId, ProgramSet, StationId};
@@ -75,6 +77,13 @@ impl Model {
     }
 }
 
+/// Inputs as last sampled and outputs as driven, by name.
+fn values(version: &Controller, driven: &Driven) -> BTreeMap<String, Value> {
+    let Interface { inputs, outputs } = &version.interface;
+    let sampled = driven.inputs.iter().flat_map(|image| named(inputs, image));
+    sampled.chain(named(outputs, &driven.outputs)).collect()
+}
+
 /// Alarms that last or are not acknowledged, without the shelved ones.
 fn open_alarms(alarms: Vec<Alarm>, process: &[ProcessAlarm]) -> Vec<Alarm> {
     let shelved = process.iter().filter(|alarm| alarm.state == AlarmState::Shelved);
@@ -102,6 +111,7 @@ impl Picture<'_> {
         let master = self.cycle.and_then(|cycle| model.cycle_master(self.standing, cycle));
         let (alarms, process_alarms) = model.open_alarms_at(cycle);
         let timing = model.timings().rfind(|timing| timing.cycle <= cycle);
+        let points = model.points_in(self.cycle);
         Snapshot {
             cluster: model.cluster().name().to_owned(),
             run: self.run(),
@@ -118,7 +128,8 @@ impl Picture<'_> {
             cycle_master: master.map(|station| self.name(Member::Station(station))),
             scenario_over: self.standing.scenario_over.clone(),
             stations: model.station_ids().map(|id| self.station(id)).collect(),
-            programs: model.program_ids().map(|id| self.program(id)).collect(),
+            programs: model.program_ids().map(|id| self.program(&points, id)).collect(),
+            points,
             remote_ios: model.program_ids().map(|id| self.remote_io(id)).collect(),
             plants: model.program_ids().filter_map(|id| self.plant(id)).collect(),
             margin: self.margin(&margin),
@@ -244,7 +255,7 @@ impl Picture<'_> {
         step.driven.as_ref()
     }
 
-    fn program(&self, program: ProgramId) -> ProgramSnapshot {
+    fn program(&self, points: &PointsInEffect, program: ProgramId) -> ProgramSnapshot {
         let model = self.model;
         let driven = self.driven(program);
         let own = self.standing.program(program).cloned().unwrap_or_default();
@@ -252,6 +263,9 @@ impl Picture<'_> {
         let has_plant = model.cluster().member_name(plant).is_some();
         let SourceCounts { direct, reconstructed, held, fail_safe } =
             model.source_counts(program, self.cycle);
+        let version = points.controller(program);
+        let unknown = points.versions().get(program.index()).filter(|_| version.is_none());
+        let named = driven.filter(|_| version.is_some());
         let source = driven.map(|driven| driven.source);
         let since = self.cycle.and_then(|cycle| model.since(program, cycle));
         ProgramSnapshot {
@@ -265,9 +279,10 @@ impl Picture<'_> {
                 .map(|station| self.name(Member::Station(station))),
             missing: driven.and_then(|driven| driven.missing).map(missing_text),
             fault: self.fault(program),
-            inputs: driven.and_then(|driven| driven.inputs.as_ref()).map(ToString::to_string),
-            outputs: driven.map(|driven| driven.outputs.to_string()),
-            values: self.values(program, driven),
+            unknown_points: unknown.map(ToString::to_string),
+            inputs: named.and_then(|driven| driven.inputs.as_ref()).map(ToString::to_string),
+            outputs: named.map(|driven| driven.outputs.to_string()),
+            values: named.zip(version).map(|(driven, of)| values(of, driven)).unwrap_or_default(),
             direct,
             reconstructed,
             held,
@@ -298,23 +313,13 @@ impl Picture<'_> {
         Some(program_fault_text(controller, Some(&fault)))
     }
 
-    fn values(&self, program: ProgramId, driven: Option<&Driven>) -> BTreeMap<String, Value> {
-        let interface = &self.model.cluster().controllers()[program.index()].interface;
-        let mut values = BTreeMap::new();
-        let inputs = driven.and_then(|driven| driven.inputs.as_ref());
-        let outputs = driven.map(|driven| &driven.outputs);
-        for (points, image) in [(&interface.inputs, inputs), (&interface.outputs, outputs)] {
-            values.extend(image.into_iter().flat_map(|image| named(points, image)));
-        }
-        values
-    }
-
     fn forced(&self, program: ProgramId) -> Vec<String> {
         let own = self.standing.program(program);
         let forced = own.into_iter().flat_map(|own| &own.forced);
-        let texts = forced.map(|ForcedSignal { force, .. }| {
-            let controller = &self.model.cluster().controllers()[program.index()];
-            let (name, value) = match forced_point(controller, force) {
+        let texts = forced.map(|ForcedSignal { force, points, .. }| {
+            let controller = self.model.present().controller_of(program, *points);
+            let point = controller.and_then(|controller| forced_point(controller, force));
+            let (name, value) = match point {
                 Some(point) if point.of == Elementary::Bool => {
                     (point.name.as_str(), force.value.stored().to_string())
                 }

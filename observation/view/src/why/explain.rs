@@ -125,10 +125,8 @@ impl<'m> Explainer<'m> {
         below: usize,
         depth: usize,
     ) -> Reason {
-        if let Some(input) =
-            self.program.inputs.iter().position(|input| input.name.as_str() == name)
-        {
-            return self.input(name, input, value, place);
+        if self.program.inputs.iter().any(|input| input.name.as_str() == name) {
+            return self.input(name, value, place);
         }
         self.count += 1;
         if depth > DEEPEST || self.count > MOST {
@@ -185,11 +183,13 @@ impl<'m> Explainer<'m> {
         end_of_history(self.history, place)
     }
 
-    fn input(&self, name: &str, input: usize, value: bool, place: usize) -> Reason {
+    fn input(&self, name: &str, value: bool, place: usize) -> Reason {
+        let version = self.model.version_at(self.history, place).ok();
+        let point = version.and_then(|it| it.controller().interface.inputs.find(name));
+        let at = |place| self.model.input_at(self.history, place, point?);
         let mut since = place;
         while let Some(before) = self.history.before(since) {
-            let sampled = self.history.steps()[before].sampled.as_ref();
-            if sampled.is_none_or(|sampled| sampled.inputs.get(input) != value) {
+            if at(before) != Some(u64::from(value)) {
                 break;
             }
             since = before;

@@ -336,10 +336,7 @@ impl<'m> Explainer<'m> {
         let mut points = self.program.inputs.iter();
         let point =
             points.find(|point| point.slot != 0 && u64::from(point.slot) == address / 64)?;
-        let at = |place: usize| {
-            let sampled = self.history.steps()[place].sampled.as_ref()?;
-            Some(point.get(sampled.inputs.words()))
-        };
+        let at = |place: usize| self.model.input_at(self.history, place, point);
         let value = at(place)?;
         let (mut since, mut known) = (place, false);
         loop {

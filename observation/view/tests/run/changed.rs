@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use serde_json::Value;
 use understudy_cluster::{ChangeTexts, Cluster, read};
-use understudy_journal::{Command, Happening, Journal, Members, Record, RunEvent, keep_cluster};
+use understudy_journal::{
+    Command, Happening, Journal, Members, Process, Record, RunEvent, keep_cluster,
+};
 use understudy_remote_io::Event;
 use understudy_simulator::{
     Action, ChangeStep, Fault, Network, Parts, Record as Simulated, Simulation, parts,
@@ -89,19 +91,37 @@ fn faults(switch: u64, back: Option<u64>) -> Vec<Fault> {
 fn records(file: &str, [before, after]: [&str; 2], faults: &[Fault]) -> (Cluster, Vec<Record>) {
     let [old, new] = [before, after].map(|program| cluster(file, program));
     let texts = ChangeTexts::between(&old, &new).expect("an online change");
-    let change = texts.load(&old).expect("of this cluster");
-    let parts = Parts { change: Some(Arc::new(change)), ..parts(&old) };
+    let records = records_of(&old, texts, faults, CYCLES);
+    (old, records)
+}
+
+/// The records of a run of a cluster that a change is loaded in.
+pub(super) fn records_of(
+    old: &Cluster,
+    texts: ChangeTexts,
+    faults: &[Fault],
+    cycles: u64,
+) -> Vec<Record> {
+    let change = texts.load(old).expect("of this cluster");
+    let parts = Parts { change: Some(Arc::new(change)), ..parts(old) };
     let mut simulation = Simulation::new(parts, Network::default(), 7);
     faults.iter().for_each(|fault| simulation.schedule(*fault));
-    let members = Members::of(&old);
+    let members = Members::of(old);
     let loaded = RunEvent::ChangeLoaded { texts: Box::new(texts) };
     let mut records = vec![Record::of_run(0, loaded)];
     let mut begun = false;
     simulation
-        .run(CYCLES, 300, &mut |now: Time, cycle, member, record: Simulated<'_>| {
+        .run(cycles, 300, &mut |now: Time, cycle, member, record: Simulated<'_>| {
             let happening = match record {
                 Simulated::Station(event) => Happening::Station(event.clone()),
                 Simulated::RemoteIo(event) => Happening::RemoteIo(event.clone()),
+                Simulated::Fault(Fault { member, action, at_cycle, .. })
+                    if Process::after(*action).is_some() =>
+                {
+                    let (action, asked) = (*action, *at_cycle);
+                    let done = RunEvent::Fault { action, member: *member, asked };
+                    return records.push(Record::of_run(now.0, done));
+                }
                 _ => return,
             };
             let origin = match (&happening, cycle) {
@@ -116,10 +136,10 @@ fn records(file: &str, [before, after]: [&str; 2], faults: &[Fault]) -> (Cluster
         })
         .expect("everybody comes");
     assert_eq!(simulation.violations(), []);
-    (old, records)
+    records
 }
 
-fn model(cluster: &Cluster, records: &[Record]) -> Model {
+pub(super) fn model(cluster: &Cluster, records: &[Record]) -> Model {
     let mut model = Model::new(Arc::new(cluster.clone()), Bounds::default());
     records.iter().for_each(|record| model.note(record));
     model

@@ -88,7 +88,7 @@ fn every_view_states_the_forced_value_while_an_output_is_forced() {
             assert_eq!(program.values["far"], driven, "{cycle}");
             assert_eq!(outputs.starts_with('1'), driven, "{cycle}");
             let series = model.series().outputs(ProgramId(0)).expect("a program");
-            let image = series.at(cycle).expect("remembered");
+            let (_, image) = series.at(cycle).expect("remembered");
             assert_eq!(image.get(0), driven, "{cycle}");
             assert_eq!(why.value, driven, "{cycle}");
             let alarm = snapshot.process_alarms.iter().find(|alarm| alarm.name == "far");

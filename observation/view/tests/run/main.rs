@@ -21,6 +21,7 @@ mod networks;
 mod numbers;
 mod overview;
 mod past;
+mod points;
 mod process_alarms;
 mod protection;
 mod replay;

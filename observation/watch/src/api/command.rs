@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use understudy_bus::RefusedOrder;
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Command, Done, Refusal, RequestedValue, WriteRequest, force_value, new_write,
+    Command, Done, PointsInEffect, Refusal, RequestedValue, WriteRequest, force_value, new_write,
 };
 use understudy_typed::Point;
 use understudy_wire::{
@@ -31,6 +31,9 @@ pub(super) struct Asked {
     command: AskedCommand,
     owner: String,
     reason: String,
+    /// Hash of the version of the program whose points the caller knows, for a command that names a signal.
+    #[serde(default)]
+    points: Option<String>,
 }
 
 /// As [`Command`]; owner and reason of a force are those of the request.
@@ -154,7 +157,9 @@ fn ordered(app: &App, person: &Person, asked: Asked) -> Answered<Ordered> {
         Problem::unknown(format!("the cluster has no member {:.60}", asked.member))
     })?;
     let started = || Problem::unknown("the run has not started");
-    let cluster = model.cluster().ok_or_else(started)?;
+    let points = model.known().ok_or_else(started)?.run.present().points();
+    let cluster = points.cluster();
+    fits(asked.points.as_deref(), points, member)?;
     let by = By { role: person.role, owner: &owner, reason: &reason };
     let command = asked.command.given(cluster, member, by)?;
     Ok(Ordered { member, command, owner, reason })
@@ -166,6 +171,19 @@ impl Asked {
         let (order, signal) = self.command.words();
         let owner = if person.name.is_empty() { &self.owner } else { &person.name };
         RefusedOrder::new(order, &self.member, owner, "").with(&signal, &self.reason)
+    }
+}
+
+/// Whether a caller names signals by the points that count: a place of others is another signal.
+fn fits(theirs: Option<&str>, points: &PointsInEffect, member: Member) -> Answered<()> {
+    let program = member.sampled_program();
+    let counts = program.and_then(|program| points.versions().get(program.index()));
+    match (theirs, counts) {
+        (Some(theirs), Some(counts)) if theirs != counts.to_string() => {
+            let message = "an online change has replaced the inputs and outputs of the program since the page was read";
+            Err(Problem::invalid("U0588", message))
+        }
+        _ => Ok(()),
     }
 }
 

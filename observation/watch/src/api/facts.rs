@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use axum::Json;
-use axum::extract::rejection::QueryRejection;
-use axum::extract::{Extension, Query, State};
+use axum::extract::rejection::{PathRejection, QueryRejection};
+use axum::extract::{Extension, Path, Query, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use understudy_cluster::{Controller, OperatorDeclaration};
+use understudy_journal::PointsInEffect;
 use understudy_remote_io::{OperatorInput, OperatorInputKind};
 use understudy_typed::Points;
 use understudy_view::shown as shown_value;
@@ -52,11 +53,13 @@ struct StationFacts {
 }
 
 #[derive(Debug, Serialize)]
-struct ProgramFacts {
+pub(super) struct ProgramFacts {
     index: usize,
     name: String,
     remote_io: String,
     plant: Option<String>,
+    /// Hash of the version of the program whose points these are; nothing of them is listed where it is not known.
+    points: Option<String>,
     inputs: Vec<SignalFacts>,
     outputs: Vec<SignalFacts>,
 }
@@ -133,7 +136,9 @@ pub(super) async fn run(
         role: if schedule.is_understudy(station) { "understudy" } else { "controller" },
         program: (!schedule.is_understudy(station)).then_some(station.index()),
     });
-    let programs = run.program_ids().map(|program| program_facts(known, program, person.role));
+    let points = run.points_in(run.newest());
+    let facts = |program| program_facts(known, &points, program, person.role);
+    let programs = run.program_ids().map(facts);
     Ok(Json(RunFacts {
         title: format!("{} · {}", cluster.name(), model.name()),
         cluster: cluster.name().to_owned(),
@@ -153,14 +158,38 @@ pub(super) async fn run(
     }))
 }
 
-fn program_facts(known: &Known, program: ProgramId, role: Role) -> ProgramFacts {
+/// A program with the points by which a cycle is shown.
+pub(super) async fn points(
+    State(app): State<Arc<App>>,
+    Extension(person): Extension<Person>,
+    program: Result<Path<u8>, PathRejection>,
+    when: Result<Query<When>, QueryRejection>,
+) -> Answered<Json<ProgramFacts>> {
+    let (Path(program), Query(when)) = (program?, when?);
+    let program = ProgramId(program);
+    at_cycle(&app, when.cycle, |known, cycle| {
+        if known.run.program_ids().all(|other| other != program) {
+            return Err(Problem::unknown(format!("the cluster has no program {}", program.0)));
+        }
+        let points = known.run.points_in(Some(cycle));
+        Ok(program_facts(known, &points, program, person.role))
+    })
+    .map(Json)
+}
+
+fn program_facts(
+    known: &Known,
+    points: &PointsInEffect,
+    program: ProgramId,
+    role: Role,
+) -> ProgramFacts {
     let cluster = known.run.cluster();
     let plant = Member::Plant(program);
-    let controller = cluster.controllers().get(program.index());
+    let controller = points.controller(program);
     let name = |member| known.run.members().name(member).to_owned();
     let mut inputs =
         controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.inputs));
-    let remote_io = cluster.remote_ios().get(program.index());
+    let remote_io = points.remote_io(program);
     for source in remote_io.iter().flat_map(|remote_io| &remote_io.inputs) {
         let input = inputs.iter_mut().find(|input| input.name == source.name);
         if let Some(input) = input {
@@ -177,6 +206,7 @@ fn program_facts(known: &Known, program: ProgramId, role: Role) -> ProgramFacts 
         name: shown::program_name(&known.run, program),
         remote_io: name(Member::RemoteIo(program)),
         plant: cluster.member_name(plant).map(str::to_owned),
+        points: points.versions().get(program.index()).map(ToString::to_string),
         inputs,
         outputs: controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.outputs)),
     }

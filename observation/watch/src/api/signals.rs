@@ -1,7 +1,7 @@
 //! Signals by identifier, and their values in a cycle.
 //!
-//! An identifier is `PROGRAM.input.NUMBER`, `PROGRAM.output.NUMBER` or `PROGRAM.state.NAME`; in a name, `;` is written for a comma, because
-//! a list of identifiers has commas between.
+//! An identifier is `PROGRAM.input.NAME`, `PROGRAM.output.NAME` or `PROGRAM.state.NAME`, or has the number of an input or output in place of its name; in a
+//! name, `;` is written for a comma, because a list of identifiers has commas between.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -46,8 +46,12 @@ impl Signals {
         let mut parts = id.splitn(3, '.');
         let program = ProgramId(parts.next()?.parse().ok()?);
         let (kind, name) = (parts.next()?, parts.next()?);
-        let controller = known.run.cluster().controllers().get(program.index())?;
-        let point = |points: &Points| points.iter().nth(name.parse().ok()?).cloned();
+        // By a number it is one of the points that count.
+        let controller = known.run.points_at(program, known.run.newest())?;
+        let point = |points: &Points| match name.parse() {
+            Ok(number) => points.iter().nth(number).cloned(),
+            Err(_) => points.iter().find(|point| identified(&point.name) == name).cloned(),
+        };
         let signal = match kind {
             "input" => Signal::Input(point(&controller.interface.inputs)?),
             "output" => Signal::Output(point(&controller.interface.outputs)?),
@@ -160,7 +164,7 @@ pub(super) async fn values(
                 }
                 Err(problem) => return Err(problem),
             };
-            let (point, image) = match signal {
+            let (point, images) = match signal {
                 Signal::Input(point) => (point, series.inputs(program)),
                 Signal::Output(point) => (point, series.outputs(program)),
                 Signal::State(signal) => {
@@ -170,8 +174,8 @@ pub(super) async fn values(
                     continue;
                 }
             };
-            if let Some(image) = image.and_then(|images| images.at(cycle)) {
-                values[place] = shown(&point.declared(), point.get(image.words()));
+            if let Some(stored) = images.and_then(|images| images.stored_at(&point, cycle)) {
+                values[place] = shown(&point.declared(), stored);
             }
         }
         for (program, (places, own)) in of_states {

@@ -13,8 +13,8 @@ use serde_json::Value;
 use understudy_cluster::{AlarmCondition, AlarmDeclaration};
 use understudy_journal::{TimeOfDay, source_word};
 use understudy_typed::Point;
-use understudy_view::{Coarse, StateSignal, Timeline, number_of};
-use understudy_wire::{Image, ProgramId};
+use understudy_view::{Images, StateSignal, number_of};
+use understudy_wire::ProgramId;
 
 use super::Answered;
 use super::facts::known;
@@ -170,30 +170,24 @@ fn trends_of(
             columns: Vec::new(),
             limits: Vec::new(),
         };
-        let mut of_point = |point: &Point, (exact, coarse): Images<'_>, is_output: bool| {
+        let mut of_point = |point: &Point, images: Option<&Images>, is_output: bool| {
             let limits = limits(known, program, point, is_output);
             let trend = Trend { limits, ..trend(&point.name) };
             trends.push(match column {
                 None => {
-                    let runs = exact.map(|timeline| runs(timeline, point, from, to));
+                    let runs = images.map(|images| runs(images, point, from, to));
                     Trend { runs: runs.unwrap_or_default(), ..trend }
                 }
                 Some(width) => {
                     let count = usize::try_from((to - from) / width + 1).unwrap_or(0);
-                    let columns = coarse.map(|coarse| coarse.columns(point, from, width, count));
+                    let columns = images.map(|images| images.columns(point, from, width, count));
                     Trend { columns: columns.unwrap_or_default(), ..trend }
                 }
             });
         };
         match signal {
-            Signal::Input(point) => {
-                let images = (series.inputs(program), series.coarse_inputs(program));
-                of_point(&point, images, false);
-            }
-            Signal::Output(point) => {
-                let images = (series.outputs(program), series.coarse_outputs(program));
-                of_point(&point, images, true);
-            }
+            Signal::Input(point) => of_point(&point, series.inputs(program), false),
+            Signal::Output(point) => of_point(&point, series.outputs(program), true),
             Signal::State(signal) => {
                 let own = of_states.entry(program.0).or_default();
                 own.0.push(trends.len());
@@ -223,13 +217,11 @@ fn trends_of(
     Ok(trends)
 }
 
-/// The images of a program, each, and as ranges.
-type Images<'m> = (Option<&'m Timeline<Image>>, Option<&'m Coarse>);
-
 /// The limits of the alarms on a point.
 fn limits(known: &Known, program: ProgramId, point: &Point, is_output: bool) -> Vec<f64> {
     let alarms = known.run.cluster().alarms().iter().filter(|alarm| {
-        (alarm.program, alarm.is_output, alarm.point.bit) == (program, is_output, point.bit)
+        let own = (alarm.program, alarm.is_output, &alarm.point.name, alarm.point.of);
+        own == (program, is_output, &point.name, point.of)
     });
     let limit = |alarm: &AlarmDeclaration| match alarm.condition {
         AlarmCondition::Above { limit, .. } | AlarmCondition::Below { limit, .. } => {
@@ -266,12 +258,7 @@ fn state_runs(
     runs
 }
 
-fn runs(
-    timeline: &Timeline<Image>,
-    point: &Point,
-    from: i64,
-    to: i64,
-) -> Vec<(i64, Option<Value>)> {
+fn runs(images: &Images, point: &Point, from: i64, to: i64) -> Vec<(i64, Option<Value>)> {
     let mut runs: Vec<(i64, Option<Value>)> = Vec::new();
     let mut push = |cycle: i64, value: Option<Value>| {
         if runs.last().is_none_or(|(_, last)| *last != value) {
@@ -279,11 +266,11 @@ fn runs(
         }
     };
     let mut known_up_to = from;
-    for span in timeline.spans(from, to + 1) {
+    for span in images.spans(point, from, to + 1) {
         if span.from > known_up_to {
             push(known_up_to, None);
         }
-        push(span.from, Some(number_of(point, span.value.words())));
+        push(span.from, Some(number_of(point, span.value)));
         known_up_to = span.to;
     }
     if known_up_to <= to {

@@ -6,6 +6,7 @@ use axum::Json;
 use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{Path, Query, State};
 use understudy_view::Why;
+use understudy_wire::ProgramId;
 
 use super::Answered;
 use super::facts::{When, at_cycle};
@@ -25,7 +26,8 @@ pub(super) async fn why(
         return Err(Problem::bad(message));
     }
     at_cycle(&app, when.cycle, |known, cycle| {
-        let controller = known.run.cluster().controllers().get(program);
+        let program_id = u8::try_from(program).ok().map(ProgramId);
+        let controller = program_id.and_then(|it| known.run.points_at(it, Some(cycle)));
         let signal = controller.and_then(|controller| {
             let outputs = &controller.interface.outputs;
             match output.parse::<usize>() {

@@ -225,13 +225,20 @@ pub(super) fn points_change(
     })
 }
 
-/// Points of both, by name and type; an enumeration is of the same type where its names have the same numbers.
-fn moved(old: &Points, new: &Points) -> Vec<Moved> {
+/// The point that a point of one version of a program is in another one: that of its name and type. An enumeration is of the same type where its names have
+/// the same numbers.
+pub fn same_point<'a>(point: &Point, others: &'a Points) -> Option<&'a Point> {
     let whole = |point: &Point| Declared { range: None, ..point.declared() };
+    let other = others.find(&point.name)?;
+    let stays = whole(point).takes(&whole(other)) && whole(other).takes(&whole(point));
+    stays.then_some(other)
+}
+
+/// Points of both.
+fn moved(old: &Points, new: &Points) -> Vec<Moved> {
     let moved = old.iter().filter_map(|before| {
-        let after = new.find(&before.name)?;
-        let stays = whole(before).takes(&whole(after)) && whole(after).takes(&whole(before));
-        stays.then(|| Moved { before: PointPlace::of(before), after: PointPlace::of(after) })
+        let after = same_point(before, new)?;
+        Some(Moved { before: PointPlace::of(before), after: PointPlace::of(after) })
     });
     moved.collect()
 }

@@ -91,6 +91,9 @@ fn a_member_reads_the_new_points_from_the_texts() {
     let outputs = "done = \"coil:2\", more = \"coil:3\", shown = \"holding:9 int\"";
     let after = with(&other(), new, "go = \"discrete:4\"", outputs);
     check_texts(&before, &after);
+    // Inputs in another order than that of the alphabet, which counts in the configuration.
+    let ordered = "inputs = { level = { operator = \"setpoint\", low = 1, high = 9 }, go = { operator = \"level\" } }\n";
+    check_texts(&before, &with(&other(), ordered, "", outputs));
     // The same points at other places of the device.
     let moved = LEFT.replace("done := go;", "done := NOT go;");
     let moved = with(&moved, old, "go = \"discrete:8\"", "done = \"coil:2\"");
