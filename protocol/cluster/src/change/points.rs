@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{
-    FallbackChange, Mode, Moved, OnlineChange, PointPlace, PointsChange, Program, ProgramChange,
+    FallbackChange, Layout, Mode, Moved, OnlineChange, PointPlace, PointsChange, Program,
+    ProgramChange,
 };
 use understudy_typed::{Declared, Point, Points};
 use understudy_wire::ProgramId;
@@ -17,6 +18,7 @@ use super::{Between, ChangeError, ChangeTexts, Difference, NeedsStop, difference
 use crate::canonical::points_hash;
 use crate::cluster::{Cluster, Controller};
 use crate::configuration::{FALLBACK, INPUT, input_line};
+use crate::device::Side;
 use crate::read::{Overrides, read_with};
 
 /// The points of a program that change: the sections of its remote I/O before and after.
@@ -209,10 +211,16 @@ pub(super) fn points_change(
     let (old, new) = (old?, new?);
     let (old_layout, new_layout) = (before.layout(program)?, after.layout(program)?);
     let wired = [before, after].map(|cluster| {
-        let field = cluster.remote_ios.get(program.index())?.field.as_ref();
-        field.map(|field| (&field.inputs, &field.outputs))
+        let field = cluster.remote_ios.get(program.index())?.field.as_ref()?;
+        let side = |side: &Side| {
+            let places = side.bindings.iter().map(|it| (it.name.clone(), it.bit, it.place));
+            (side.rest.clone(), places.collect::<Vec<_>>())
+        };
+        Some((side(&field.inputs), side(&field.outputs)))
     });
-    let is_equal = old_layout == new_layout && wired[0] == wired[1];
+    // More names of values leave the points as they are.
+    let is_equal = Layout { hash: old_layout.hash, ..new_layout.clone() } == old_layout
+        && wired[0] == wired[1];
     // A device that is wired in another way has other points where the program is another one: without a mark, nothing tells when.
     if old.hash == new.hash || different_point(&old.code, &new.code).is_none() && is_equal {
         return None;

@@ -162,6 +162,28 @@ fn points_of_another_body_stay() {
     check_texts(&cluster(LEFT, "", ""), &cluster(&body, "", ""));
 }
 
+/// A value of an enumeration more, or another case of its letters, leaves the points, with and without a device, and keeps their values.
+#[test]
+fn points_with_more_names_of_values_stay() {
+    let text =
+        |values: &str| format!("TYPE Mode : ({values}); END_TYPE {LEFT}").replace("INT;", "Mode;");
+    let device = "field = { modbus = \"127.0.0.1:1502\", inputs = { level = \"holding:1 int\" }, outputs = { shown = \"holding:2 int\" } }";
+    for keys in ["", device] {
+        for (values, stays) in [("Off, Auto, Man", true), ("off, auto", true), ("Auto, Off", false)]
+        {
+            let (before, after) =
+                (cluster(&text("Off, Auto"), keys, ""), cluster(&text(values), keys, ""));
+            let change = change_with_points(&before, &after).expect("an online change");
+            let changed = change.of(ProgramId(0)).expect("it changes");
+            assert_eq!(changed.points.is_none(), stays, "{values}");
+            assert_ne!(changed.known_by[0], changed.known_by[1], "{values}");
+            if keys.is_empty() {
+                check_texts(&before, &after);
+            }
+        }
+    }
+}
+
 /// Who names a point says by which file: another name, place, type or name of a value is another file, and nothing else is.
 #[test]
 fn points_are_known_by_names_places_and_types() {
