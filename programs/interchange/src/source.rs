@@ -85,10 +85,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         return SourceFile { rungs, ..source(read) };
     }
     let Reading { program, period, mut diagnostics, .. } = read(format, name, text, wanted.program);
-    if let (Some(ladder), Some(wanted)) = (&program, wanted.period) {
-        diagnostics.extend(another_period(ladder, period, Some(wanted)));
-        diagnostics.extend(ladder.preset_warnings(wanted));
-    }
+    let other = program.as_ref().and_then(|it| another_period(it, period, wanted.period));
+    diagnostics.extend(other);
     let typed = program.as_ref().filter(|_| !has_errors(&diagnostics)).and_then(|ladder| {
         let typed = ladder.typed(wanted.period.or(period).unwrap_or(USUAL_PERIOD));
         typed.map_err(|error| diagnostics.push(not_run(&error))).ok()

@@ -42,14 +42,17 @@ impl SourceText {
 
     pub(crate) fn read(&self) -> ReadSource {
         let wanted = Wanted { period: Some(self.period), program: None };
-        let SourceFile { source, rungs, diagnostics, .. } =
+        let SourceFile { source, rungs, mut diagnostics, .. } =
             read_source(&self.file, &self.text, wanted);
+        let ladder = rungs.and_then(Rungs::written);
+        let presets = ladder.iter().flat_map(|ladder| ladder.preset_warnings(self.period));
+        diagnostics.extend(presets);
         let (program, is_library) = match source {
             Some(Source::Program(program)) => (Some(program), false),
             Some(Source::Library(_)) => (None, true),
             None => (None, false),
         };
-        ReadSource { program, ladder: rungs.and_then(Rungs::written), is_library, diagnostics }
+        ReadSource { program, ladder, is_library, diagnostics }
     }
 
     /// What a station keeps of the program of this text.
