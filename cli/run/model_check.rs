@@ -246,6 +246,7 @@ fn budget(arguments: &Arguments) -> Budget {
         crashes: of(Kind::Crash),
         stops: of(Kind::Stop),
         cuts: 0,
+        links: 0,
         total: arguments.faults,
         cycles: arguments.cycles,
     }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use understudy_simulator::{Action, Fault};
-use understudy_wire::Member;
+use understudy_wire::{Member, Via};
 
 /// Where slots begin, as shares of T. A frame that is sent in a slot arrives in the next one.
 pub(crate) const SLOTS: [f64; 8] = [0.025, 0.075, 0.125, 0.175, 0.225, 0.675, 0.725, 0.975];
@@ -26,6 +26,8 @@ pub struct Budget {
     pub stops: u8,
     /// Cuts of the network into two parts; each may be healed at any later slot.
     pub cuts: u8,
+    /// Direct links that are pulled; each may be plugged in again at any later slot.
+    pub links: u8,
     /// All of them together.
     pub total: u8,
     /// Cycles in which anything may be done.
@@ -79,6 +81,10 @@ pub enum Step {
         /// The part that was cut off.
         side: u32,
     },
+    /// The direct link of a remote I/O is pulled.
+    Pull(Member),
+    /// It is plugged in again.
+    Plug(Member),
     /// The next slot begins.
     Wait,
 }
@@ -118,27 +124,51 @@ fn separated(side: u32, members: &[Member]) -> impl Iterator<Item = (Member, Mem
     apart.map(|((_, from), (_, to))| (*from, *to))
 }
 
-/// Everybody who is down, and whether it has crashed, comes back at `place`, and a cut is healed.
-pub(crate) fn revivals<'d>(
-    down: impl Iterator<Item = &'d (Member, bool)>,
-    cut: Option<u32>,
-    place: Place,
-    members: &[Member],
-) -> Vec<Fault> {
-    let back = |&(member, crashed): &(Member, bool)| Fault {
-        at_cycle: place.cycle,
-        phase: place.phase(),
-        member,
-        action: if crashed { Action::Restart } else { Action::Continue },
-    };
-    let heal = |(from, to): (Member, Member)| Fault {
-        at_cycle: place.cycle,
-        phase: place.phase(),
-        member: from,
-        action: Action::Heal { to },
-    };
-    let healed = cut.into_iter().flat_map(|side| separated(side, members).map(heal));
-    down.map(back).chain(healed).collect()
+/// What has failed and has not come back.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Failed {
+    /// Who is down, and whether it has crashed.
+    pub(crate) down: Vec<(Member, bool)>,
+    /// One part of the network, where it is cut.
+    pub(crate) cut: Option<u32>,
+    /// Remote I/Os whose direct link is pulled.
+    pub(crate) pulled: Vec<Member>,
+}
+
+impl Failed {
+    pub(crate) fn new(down: Vec<(Member, bool)>) -> Self {
+        Self { down, cut: None, pulled: Vec::new() }
+    }
+
+    pub(crate) fn note(&mut self, step: Step) {
+        match step {
+            Step::Crash(member) | Step::Stop(member) => {
+                self.down.push((member, matches!(step, Step::Crash(_))));
+            }
+            Step::Restart(member) | Step::Continue(member) => {
+                self.down.retain(|&(other, _)| other != member);
+            }
+            Step::Cut { side } => self.cut = Some(side),
+            Step::Heal { .. } => self.cut = None,
+            Step::Pull(member) => self.pulled.push(member),
+            Step::Plug(member) => self.pulled.retain(|&other| other != member),
+            _ => {}
+        }
+    }
+
+    /// The steps that bring each of them back, of those that pass `is_wanted`.
+    pub(crate) fn revivals(
+        &self,
+        is_wanted: impl Fn(Member) -> bool,
+    ) -> impl Iterator<Item = Step> {
+        let down = self.down.iter().filter(move |(member, _)| is_wanted(*member));
+        let back = down.map(|&(member, crashed)| match crashed {
+            true => Step::Restart(member),
+            false => Step::Continue(member),
+        });
+        let healed = self.cut.map(|side| Step::Heal { side });
+        back.chain(healed).chain(self.pulled.iter().copied().map(Step::Plug))
+    }
 }
 
 /// The faults that a step at `place` is; nothing for waiting. `members` are all of the cluster.
@@ -180,6 +210,8 @@ pub(crate) fn faults(step: Step, place: Place, members: &[Member], period: Durat
                 })
                 .collect()
         }
+        Step::Pull(member) => vec![fault(place, member, Action::Unplug { network: Via::Link })],
+        Step::Plug(member) => vec![fault(place, member, Action::Plug { network: Via::Link })],
         Step::Wait => Vec::new(),
     }
 }

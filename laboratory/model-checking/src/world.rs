@@ -10,7 +10,7 @@ use understudy_wire::{Member, ProgramId, StationId, StationSet};
 
 use crate::properties::{Property, RECOVERY_CYCLES};
 use crate::start::Start;
-use crate::step::{Budget, LATE_PER_MILLE, Place, Step, faults, revivals};
+use crate::step::{Budget, Failed, LATE_PER_MILLE, Place, Step, faults};
 
 /// A prime above the number of faults that can be done at one place, so that the shards share those of each place.
 const FIRST_FAULTS_OF_A_PLACE: u64 = 1009;
@@ -26,6 +26,8 @@ pub struct Model {
     pub(crate) members: Vec<Member>,
     /// Slots of spares: empty until they wake, at any time and for any reason.
     slots: StationSet,
+    /// Remote I/Os with a direct link to their twins.
+    linked: Vec<Member>,
     period: Duration,
     pub(crate) budget: Budget,
     properties: Vec<Property>,
@@ -40,12 +42,9 @@ pub struct World {
     pub(crate) place: Place,
     /// What has been done so far.
     pub(crate) used: Budget,
-    /// Who is down, and whether it has crashed.
-    pub(crate) down: Vec<(Member, bool)>,
+    pub(crate) failed: Failed,
     /// Who has been down.
     pub(crate) was_down: Vec<Member>,
-    /// One part of the network, where it is cut.
-    pub(crate) cut: Option<u32>,
     /// The last step since the slot began: things that are done at one time are done in one order only.
     last: Option<Step>,
 }
@@ -64,11 +63,12 @@ impl Model {
         let members = stations.chain(remote_ios).chain(twins).collect();
         let schedule = &parts.stations[0].agreement.schedule;
         let (period, slots) = (schedule.period(), schedule.spare_slots());
+        let linked = parts.direct_links.iter().map(Member::RemoteIo).collect();
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         let properties = start.properties();
         let shard = Shard::WHOLE;
-        Ok(Self { origin, start, members, slots, period, budget, properties, shard })
+        Ok(Self { origin, start, members, slots, linked, period, budget, properties, shard })
     }
 
     /// The part of the model whose runs begin with every N-th fault that can be the first one. All shards together have all runs; the runs without
@@ -98,16 +98,11 @@ impl Model {
         self.start.down.iter().copied().chain(slots).map(|member| (member, true)).collect()
     }
 
-    /// What brings back all who are down at a place; an empty slot is in order.
-    pub(crate) fn revivals(
-        &self,
-        down: &[(Member, bool)],
-        cut: Option<u32>,
-        place: Place,
-    ) -> Vec<Fault> {
+    /// What brings back all that has failed at a place; an empty slot is in order.
+    pub(crate) fn revivals(&self, failed: &Failed, place: Place) -> Vec<Fault> {
         let is_slot = |member| matches!(member, Member::Station(it) if self.slots.contains(it));
-        let missed = down.iter().filter(|(member, _)| !is_slot(*member));
-        revivals(missed, cut, place, &self.members)
+        let steps = failed.revivals(|member| !is_slot(member));
+        steps.flat_map(|step| faults(step, place, &self.members, self.period)).collect()
     }
 
     /// Where the first thing is done.
@@ -117,28 +112,19 @@ impl Model {
 
     /// The faults that a path of steps is, in the order in which they have to be scheduled.
     pub fn faults(&self, steps: &[Step]) -> Vec<Fault> {
-        let mut cut = None;
         let mut place = self.first();
         let mut all = self.start.faults();
-        let mut down = self.down();
+        let mut failed = Failed::new(self.down());
         for &step in steps {
             all.extend(faults(step, place, &self.members, self.period));
-            match step {
-                Step::Wait => place = place.next(),
-                Step::Crash(member) | Step::Stop(member) => {
-                    down.push((member, matches!(step, Step::Crash(_))));
-                }
-                Step::Restart(member) | Step::Continue(member) => {
-                    down.retain(|&(other, _)| other != member);
-                }
-                Step::Cut { side } => cut = Some(side),
-                Step::Heal { .. } => cut = None,
-                _ => {}
+            failed.note(step);
+            if step == Step::Wait {
+                place = place.next();
             }
         }
         // Who is still down where the run is over comes back, as for the property that protection does.
         if place.cycle >= self.last_cycle() {
-            all.extend(self.revivals(&down, cut, place));
+            all.extend(self.revivals(&failed, place));
         }
         all
     }
@@ -174,7 +160,12 @@ impl World {
             Step::Crash(_) => &mut used.crashes,
             Step::Stop(_) => &mut used.stops,
             Step::Cut { .. } => &mut used.cuts,
-            Step::Restart(_) | Step::Continue(_) | Step::Heal { .. } | Step::Wait => return,
+            Step::Pull(_) => &mut used.links,
+            Step::Restart(_)
+            | Step::Continue(_)
+            | Step::Heal { .. }
+            | Step::Plug(_)
+            | Step::Wait => return,
         };
         *spent += 1;
         used.total += 1;
@@ -193,9 +184,8 @@ impl stateright::Model for Model {
             simulation,
             place,
             used: Budget::default(),
-            down: self.down(),
+            failed: Failed::new(self.down()),
             was_down: self.start.members().collect(),
-            cut: None,
             last: None,
         }]
     }
@@ -205,11 +195,9 @@ impl stateright::Model for Model {
         if world.place.cycle >= self.last_cycle() {
             return;
         }
-        let is_down = |member: Member| world.down.iter().any(|&(down, _)| down == member);
-        for &(member, crashed) in &world.down {
-            steps.push(if crashed { Step::Restart(member) } else { Step::Continue(member) });
-        }
-        steps.extend(world.cut.map(|side| Step::Heal { side }));
+        let failed = &world.failed;
+        let is_down = |member: Member| failed.down.iter().any(|&(down, _)| down == member);
+        steps.extend(failed.revivals(|_| true));
         let before_faults = steps.len();
         if used.total < budget.total {
             let senders = self.senders(world);
@@ -233,10 +221,14 @@ impl stateright::Model for Model {
             if used.duplicates < budget.duplicates {
                 steps.extend(self.members.iter().map(|&from| Step::Twice { from }));
             }
-            if used.cuts < budget.cuts && world.cut.is_none() {
+            if used.cuts < budget.cuts && failed.cut.is_none() {
                 // A side and the other one are one cut.
                 let sides = 1..1_u32 << (self.members.len() - 1);
                 steps.extend(sides.map(|side| Step::Cut { side }));
+            }
+            if used.links < budget.links {
+                let whole = self.linked.iter().filter(|member| !failed.pulled.contains(member));
+                steps.extend(whole.copied().map(Step::Pull));
             }
             for &member in self.members.iter().filter(|&&member| !is_down(member)) {
                 if used.crashes < budget.crashes {
@@ -264,16 +256,9 @@ impl stateright::Model for Model {
         for fault in faults(step, world.place, &self.members, self.period) {
             next.simulation.schedule(fault);
         }
+        next.failed.note(step);
         match step {
-            Step::Crash(member) | Step::Stop(member) => {
-                next.down.push((member, matches!(step, Step::Crash(_))));
-                next.was_down.push(member);
-            }
-            Step::Restart(member) | Step::Continue(member) => {
-                next.down.retain(|&(down, _)| down != member);
-            }
-            Step::Cut { side } => next.cut = Some(side),
-            Step::Heal { .. } => next.cut = None,
+            Step::Crash(member) | Step::Stop(member) => next.was_down.push(member),
             Step::Wait => {
                 next.last = None;
                 next.place = world.place.next();
@@ -293,9 +278,8 @@ impl stateright::Model for Model {
 
 impl Hash for World {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
-        let Self { simulation, place, used, down, was_down, cut, last } = self;
-        (simulation, place, used, down, was_down, last).hash(hasher);
-        cut.hash(hasher);
+        let Self { simulation, place, used, failed, was_down, last } = self;
+        (simulation, place, used, failed, was_down, last).hash(hasher);
         let untrue = |tally: &understudy_simulator::Tally| tally.held + tally.fail_safe > 0;
         simulation.tallies().iter().any(untrue).hash(hasher);
     }
@@ -315,7 +299,7 @@ impl fmt::Debug for World {
             .debug_struct("World")
             .field("place", &self.place)
             .field("used", &self.used)
-            .field("down", &self.down)
+            .field("down", &self.failed.down)
             .field("violations", &self.simulation.violations())
             .finish_non_exhaustive()
     }

@@ -14,7 +14,7 @@ pub(super) const PROPERTY: Property = Property {
             return true;
         }
         let mut simulation = world.simulation.clone();
-        for fault in model.revivals(&world.down, world.cut, world.place) {
+        for fault in model.revivals(&world.failed, world.place) {
             simulation.schedule(fault);
         }
         let mut back = simulation.run(1, RECOVERY_CYCLES, &mut |_, _, _, _| {});

@@ -149,7 +149,12 @@ pub(crate) fn paired(wiring: Wiring) -> Parts {
     parts
 }
 
-/// The same where the output is a number that modules of both drive together: 4 or 0, so that two halves are 4, and anything more is found.
+/// The same with a direct link between the two.
+pub(crate) fn linked(wiring: Wiring) -> Parts {
+    Parts { direct_links: ProgramSet::first(1), ..paired(wiring) }
+}
+
+/// The same as [`paired`] where the output is a number that modules of both drive together: 4 or 0, so that two halves are 4, and anything more is found.
 pub(crate) fn sharing() -> Parts {
     let mut parts = cell(&[number()], (1, 0), Turns::Token);
     parts.change = None;

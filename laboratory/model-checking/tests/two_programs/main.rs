@@ -11,7 +11,7 @@ use understudy_cycle::Turns;
 use understudy_model_checking::{Budget, Model, Start, Step, check};
 use understudy_simulator::{Parts, Tally};
 
-use cell::{paired, parts, sharing};
+use cell::{linked, paired, parts, sharing};
 
 /// All that can be done once, and nothing of anything.
 const ONE: Budget = Budget {
@@ -31,6 +31,7 @@ const NONE: Budget = Budget {
     crashes: 0,
     stops: 0,
     cuts: 0,
+    links: 0,
     total: 0,
     cycles: 0,
 };

@@ -70,6 +70,14 @@ fn two_crashes_or_stops_of_two_that_are_both_wired() {
     check_wired(PARALLEL, Budget { cuts: 0, ..TWO }, 689_704);
 }
 
+/// Two of all faults, of which one cuts the network, or pulls the direct link that joins the two.
+#[test]
+fn two_faults_of_two_with_a_direct_link() {
+    let budget = Budget { losses: 1, links: 1, cycles: 1, ..TWO };
+    check_from(Start::default(), linked(Wiring::Exclusive), budget, 159_390);
+    check_from(Start::default(), linked(PARALLEL), budget, 0);
+}
+
 /// Each of the two drives half of the number.
 fn check_sharing(budget: Budget, states: usize) {
     let start = Start { quiet_cycles: 20, ..Start::default() };
