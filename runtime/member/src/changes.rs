@@ -160,9 +160,13 @@ impl Keeper {
         Ok(restored)
     }
 
+    fn tell_programs(&self) {
+        self.programs.are(self.kept_programs());
+    }
+
     /// Records may be of the programs of the change that goes on, of one that was loaded, and of the cluster. Those of a remote I/O have the names of the
     /// inputs that keep their values, too.
-    fn tell_programs(&self) {
+    fn kept_programs(&self) -> Vec<RetainedProgram> {
         let current = self.kept.current.as_ref().map(|(texts, _)| texts);
         let texts = current.into_iter().chain(&self.loaded);
         let programs = texts.flat_map(|texts| {
@@ -179,7 +183,7 @@ impl Keeper {
                 RetainedProgram { inputs, ..kept }
             })
         });
-        self.programs.are(programs.collect());
+        programs.collect()
     }
 
     /// The cluster in one of the configurations of the change that goes on; nothing where there is none.
@@ -391,6 +395,33 @@ mod tests {
             fs::remove_file(&file).expect("removed");
         }
         fs::remove_dir_all(&folder).expect("removed");
+    }
+
+    /// A third program takes the values of operator inputs over by their names, so these are kept with both programs of a change.
+    #[test]
+    fn programs_are_kept_with_the_inputs_that_keep_their_values() {
+        let with = |inputs: &str, keys: &str| {
+            let program = format!(
+                "PROGRAM one\nVAR_INPUT {inputs} : INT; END_VAR\nVAR_OUTPUT y : INT; END_VAR\nVAR RETAIN n : INT; END_VAR\ny := a;\nn := n + 1;\nEND_PROGRAM"
+            );
+            let text = format!("{FILE}inputs = {{ {keys} }}\n");
+            let loaded =
+                understudy_cluster::read("cluster.toml", &text, &mut |_| Ok(program.clone()));
+            loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
+        };
+        let key = |name: &str, retain: bool| {
+            format!("{name} = {{ operator = \"setpoint\", low = 0, high = 9, retain = {retain} }}")
+        };
+        let before = with("a, b", &[key("a", true), key("b", false)].join(", "));
+        let after = with("c, a", &[key("a", true), key("c", true)].join(", "));
+        let texts = ChangeTexts::with_points(&before, &after).expect("an online change");
+        let folder = std::env::temp_dir().join(format!("understudy-inputs-{}", std::process::id()));
+        let (_, mut keeper) = start(&folder.join("kept.one.change"), &before);
+        keeper.load(&serde_json::to_string(&texts).expect("JSON")).expect("it is of this cluster");
+        let mut kept: Vec<Vec<String>> =
+            keeper.kept_programs().into_iter().map(|program| program.inputs).collect();
+        kept.iter_mut().for_each(|names| names.sort());
+        assert_eq!(kept, [vec!["a".to_owned()], vec!["a".to_owned(), "c".to_owned()]]);
     }
 
     #[test]
