@@ -84,7 +84,7 @@ pub fn change_with_points(
     after: &Cluster,
 ) -> Result<OnlineChange, Vec<NeedsStop>> {
     let (mut programs, mut fallbacks) = (Vec::new(), Vec::new());
-    for difference in differences(before, after, super::Points::MayChange)? {
+    for difference in differences(before, after)? {
         let Difference { program, is_replaced, points, fallback } = difference;
         if points.is_some() || fallback.is_some() {
             let settings = |cluster: &Cluster| cluster.remote_ios[program.index()].fallback.clone();
@@ -233,15 +233,19 @@ pub(super) fn points_change(
     })
 }
 
-/// Points of both, by name and type; an enumeration is of the same type where its names have the same numbers.
+/// Points of both, by name and type.
 fn moved(old: &Points, new: &Points) -> Vec<Moved> {
-    let whole = |point: &Point| Declared { range: None, ..point.declared() };
     let moved = old.iter().filter_map(|before| {
-        let after = new.find(&before.name)?;
-        let stays = whole(before).takes(&whole(after)) && whole(after).takes(&whole(before));
-        stays.then(|| Moved { before: PointPlace::of(before), after: PointPlace::of(after) })
+        let after = new.find(&before.name).filter(|after| stays(before, after))?;
+        Some(Moved { before: PointPlace::of(before), after: PointPlace::of(after) })
     });
     moved.collect()
+}
+
+/// Whether a point of the same name is of the same type; an enumeration is where its names have the same numbers.
+pub(super) fn stays(before: &Point, after: &Point) -> bool {
+    let [before, after] = [before, after].map(|it| Declared { range: None, ..it.declared() });
+    before.takes(&after) && after.takes(&before)
 }
 
 /// Why the points of a program cannot change while it runs.
