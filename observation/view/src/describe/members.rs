@@ -131,7 +131,7 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     Points { version } => "points" Info format!("begins with the inputs and outputs of the program {version}");
     PointsChanged { to, .. } => "points-changed" Notice format!("its inputs and outputs are those of the program {to} from this cycle on");
     PointsUnknown { version, .. } => "points-unknown" Alarm format!(
-        "it does not have the inputs and outputs of the program {version} that runs: it samples nothing and drives the fail-safe values; give `prepare` again"
+        "it does not have the inputs and outputs of the program {version} that runs: it samples nothing and drives the fail-safe values; give `prepare` again (U0650)"
     );
     ChangeTakenBack { to, .. } => "change-taken-back" Alarm format!(
         "a program fault takes the online change back: its program is {to} again; end the change with `cancel`, or correct the new program and switch again"
