@@ -109,7 +109,7 @@ fn twins_that_cannot_work_are_refused_in_words_of_the_cluster_file() {
 
     let one_host = linked("", "link_address = \"10.0.9.22:7452\"", &twin);
     let (status, codes, messages, _) = found(&one_host);
-    assert_eq!((status, codes.concat().as_str()), (0, "U0262"), "{messages}");
+    assert!(status == 0 && codes.iter().any(|it| it == "U0262"), "{messages}");
     assert!(messages.contains("both at 10.0.9.22"), "{messages}");
 
     // A twin has the program of its remote I/O, and serves no other one.

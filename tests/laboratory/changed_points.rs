@@ -12,7 +12,9 @@ use nix::sys::signal::Signal;
 use serde_json::Value;
 use understudy_cluster::{ChangeTexts, Cluster, read};
 use understudy_journal::{Command, Commander, OperatorAction};
-use understudy_wire::{ChangeRequest, Member, ProgramHash, ProgramId, StationId};
+use understudy_wire::{
+    ChangeRequest, Member, ProgramHash, ProgramId, SignalPlace, StationId, Unforce,
+};
 
 use super::deaths::{Records, is};
 use super::shared::{DEADLINE, answer, empty_folder, modbus, some_at_a_time};
@@ -304,10 +306,12 @@ fn a_device_is_driven_by_the_points_of_the_program_that_runs() {
     written(&log, begun, 11, SENSORS[6]);
     written(&log, begun, 12, SENSORS[3] + 2);
     // Who knows the file before alone does not reach another signal.
-    let run = cell.run.to_str().expect("text").to_owned();
-    let force = ["operate", &run, "--name", "drive-io", "force", "echo=99"];
-    let (exit, document, _) = answer(&force);
-    assert_eq!((exit, &document["failures"][0]["code"]), (1, &Value::from("U0638")), "{document}");
+    let outputs = &cell.before.cluster.controllers()[0].interface.outputs;
+    let gone = outputs.find("gone").expect("an output");
+    let signal = SignalPlace::Output(u16::try_from(gone.bit).expect("a place"));
+    let points = cell.before.cluster.points_hash(ProgramId(0));
+    let refused = cell.act(DRIVE_IO, Command::Unforce(Unforce { signal, points }));
+    assert!(refused.as_ref().is_err_and(|why| why.starts_with("U0638")), "{refused:?}");
     let middle = length(&log);
     let applied = cell.cancel();
     let again = cell.before.output(&applied, "shown");
@@ -398,8 +402,8 @@ fn the_tool_changes_points() {
     done("switch");
     let changed = |record: &Value| is(record, "drive-io", "points-changed");
     cell.records.wait_for("the change of the points", changed);
-    let refused = (1, Some("U0638".to_owned()));
-    assert_eq!(force("gone=98"), refused);
+    let unknown = (2, Some("U0556".to_owned()));
+    assert_eq!(force("gone=98"), unknown);
     done("cancel");
     cell.records.wait_for("the change back", changed);
     assert_eq!(force("gone=97"), (0, None));
@@ -413,7 +417,7 @@ fn the_tool_changes_points() {
     let applied = cell.records.wait_for("the outputs of the new program", shown);
     let event = &applied["event"];
     assert_eq!(cell.after.output(event, "extra"), cell.after.output(event, "shown"), "{applied}");
-    assert_eq!(force("gone=96"), refused);
+    assert_eq!(force("gone=96"), unknown);
     let missed = cell.end();
     assert!(missed.is_empty(), "{missed:?}");
 }

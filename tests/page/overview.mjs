@@ -40,7 +40,7 @@ run(async () => {
   await click("#only-not-normal");
   await until("what is not normal", `${tiles()}.join() === "${wanted}" && ${tiles("normal")}.length === 0`);
   sees((await evaluate(`[...document.querySelectorAll("#counts-table tbody tr")].map((row) => row.dataset.key).join()`)) === wanted, "the deadlines are of other programs");
-  sees((await evaluate(`[...document.querySelectorAll("#signals-list details")].map((row) => row.dataset.key).join()`)) === wanted, "the signals are of other programs");
+  sees((await evaluate(`[...document.querySelectorAll("#signals-list details")].map((row) => row.dataset.program).join()`)) === wanted, "the signals are of other programs");
   await until("its address", `location.hash.includes("only=1")`);
   await click('.tile[data-program="press-9"]');
   await until("its picture", `document.querySelector('.picture g.member[data-name="press-9"]') !== null && document.querySelector('.picture g.member[data-name="robot-4"]') === null`);

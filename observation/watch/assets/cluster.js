@@ -70,7 +70,7 @@ function choose(program) {
   draw(program);
   const { name } = run.programs[program];
   for (const details of document.querySelectorAll("#signals-list details")) {
-    details.open = details.dataset.key === name;
+    details.open = details.dataset.program === name;
   }
 }
 
@@ -216,7 +216,7 @@ function signals(programs) {
       const line = (signal, kind, index) =>
         el("button", { type: "button", class: "signal", "data-kind": kind, "data-index": index, click: () => pick(program.index, kind, index) },
           el("span", { class: "lamp", "aria-hidden": "true" }), el("span", { class: "signal-name" }, broken(signal.name)), el("span", { class: "signal-value" }), el("span", { class: "signal-forced" }));
-      return el("details", { open: !large },
+      return el("details", { open: !large, "data-program": program.name },
         el("summary", {}, program.name, " ", el("span", { class: "source-words" })),
         el("div", { class: "signal-columns" },
           el("div", {}, el("h3", {}, "inputs"), facts.inputs.map((signal, index) => line(signal, "input", index))),
