@@ -17,7 +17,7 @@ use understudy_wire::{
 };
 
 use super::deaths::{Records, is};
-use super::shared::{DEADLINE, answer, empty_folder, modbus, some_at_a_time};
+use super::shared::{DEADLINE, empty_folder, modbus, some_at_a_time};
 use super::{no_orphan, running_with, signal};
 
 const CLUSTER: &str = r#"

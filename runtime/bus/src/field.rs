@@ -48,6 +48,12 @@ pub trait FieldDriver: Send {
         None
     }
 
+    /// How old the sensors of a field that is reached over the link may be, where the other remote I/O of the program reads modules of its own: older ones
+    /// are not compared with those.
+    fn stale_after(&self) -> Option<Duration> {
+        None
+    }
+
     /// What is new since the last look, where the field is reached by another way than the link.
     fn look(&mut self) -> Option<Look> {
         None
@@ -85,6 +91,9 @@ impl FieldDriver for NoField {
 /// A plant sends in every period; one that has sent nothing for so long is suspended, has ended, or is not received.
 const PLANT_PATIENCE: Duration = Duration::from_secs(1);
 
+/// Periods without sensors after which they are stale: one frame of a plant may be lost, and one late.
+const STALE_PERIODS: u32 = 3;
+
 /// Of a remote I/O whose plant is a process of its own and is reached over the link.
 #[derive(Debug, Clone)]
 pub struct SimulatedField {
@@ -94,6 +103,7 @@ pub struct SimulatedField {
     configurations: Configurations,
     has_plant: bool,
     connected: bool,
+    has_own_modules: bool,
 }
 
 impl SimulatedField {
@@ -101,13 +111,21 @@ impl SimulatedField {
     pub fn new(program: ProgramId, agreement: Arc<Agreement>) -> Self {
         let own = Member::RemoteIo(program);
         let configurations = Configurations { own: agreement.configuration, prepared: None };
-        Self { own, program, agreement, configurations, has_plant: false, connected: true }
+        Self {
+            own,
+            program,
+            agreement,
+            configurations,
+            has_plant: false,
+            connected: true,
+            has_own_modules: false,
+        }
     }
 
     /// Of `own`, one of two remote I/Os of the program: it is connected when it is told to, or from the start on where it has modules of its own.
     #[must_use]
     pub fn of_pair(self, own: Member, has_own_modules: bool) -> Self {
-        Self { own, connected: has_own_modules, ..self }
+        Self { own, connected: has_own_modules, has_own_modules, ..self }
     }
 
     /// The cluster has a plant there, whose silence is reported.
@@ -154,5 +172,10 @@ impl FieldDriver for SimulatedField {
     fn patience(&self) -> Option<Duration> {
         (self.has_plant && self.connected)
             .then(|| PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
+    }
+
+    fn stale_after(&self) -> Option<Duration> {
+        let is_compared = self.has_plant && self.has_own_modules;
+        is_compared.then(|| self.agreement.schedule.period() * STALE_PERIODS)
     }
 }

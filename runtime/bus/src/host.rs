@@ -292,12 +292,25 @@ impl<M: Machine> Host<'_, M> {
         self.drain(now, round);
     }
 
-    /// Reports a field that is reached over the link and shows nothing any more. Its last sensors are sampled meanwhile.
+    /// Reports a field that is reached over the link and shows nothing any more. Its last sensors are sampled meanwhile, where no other module reads them.
     fn note_silence(&mut self, now: Time, round: &mut Round) {
-        if let Some(patience) = self.field.patience()
-            && let Some(reason) = round.field_silence.lasts(now, patience)
-        {
+        let Some(patience) = self.field.patience() else {
+            return;
+        };
+        let lasted = round.field_silence.lasts(now, patience);
+        let limit = self.field.stale_after();
+        if let Some(lasted) = lasted {
+            let seconds = lasted.as_secs_f64();
+            let then = match limit {
+                Some(_) => "the modules of the other remote I/O count alone",
+                None => "the last sensors are sampled",
+            };
+            let reason = format!("its plant has sent nothing for {seconds:.1} s; {then}");
             self.sink.record(now, Noted::Host(HostEvent::FieldLost { reason }));
+        }
+        if limit.is_some_and(|limit| round.field_silence.is_stale_after(limit)) {
+            self.machine.handle_input(now, Input::RemoteIo(RemoteIoInput::FieldLost));
+            self.drain(now, round);
         }
     }
 

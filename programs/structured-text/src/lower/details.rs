@@ -24,8 +24,11 @@ struct Types<'f> {
 }
 
 impl Lowering<'_> {
-    /// Notes it of all points and variables of the program.
+    /// Notes it of all points and variables of the program. One with errors is not used, and may be larger than any that is.
     pub(super) fn mark_details(&mut self, file: &File) {
+        if understudy_text::has_errors(&self.diagnostics) {
+            return;
+        }
         let types =
             file.types.iter().map(|definition| (definition.name.key(), &definition.of.kind));
         let blocks = file.units.iter().filter(|unit| unit.kind == UnitKind::FunctionBlock);

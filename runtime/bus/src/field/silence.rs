@@ -17,6 +17,7 @@ pub(crate) struct Silence {
     lasted: Duration,
     is_heard: bool,
     is_reported: bool,
+    is_stale: bool,
 }
 
 impl Silence {
@@ -24,11 +25,12 @@ impl Silence {
     pub(crate) fn ends(&mut self) -> bool {
         self.lasted = Duration::ZERO;
         self.is_heard = true;
+        self.is_stale = false;
         std::mem::replace(&mut self.is_reported, false)
     }
 
-    /// Notes that nothing has been heard up to `now`; the words of the report, once, when that has lasted for longer than `patience`.
-    pub(crate) fn lasts(&mut self, now: Time, patience: Duration) -> Option<String> {
+    /// Notes that nothing has been heard up to `now`; for how long, once, when that has lasted for longer than `patience`.
+    pub(crate) fn lasts(&mut self, now: Time, patience: Duration) -> Option<Duration> {
         self.lasted += now.since(self.looked).min(patience / PARTS);
         self.looked = now;
         let limit = if self.is_heard { patience } else { patience * START };
@@ -36,8 +38,12 @@ impl Silence {
             return None;
         }
         self.is_reported = true;
-        let seconds = limit.as_secs_f64();
-        Some(format!("its plant has sent nothing for {seconds:.1} s; the last sensors are sampled"))
+        Some(limit)
+    }
+
+    /// Whether it has lasted for longer than `limit`; true once.
+    pub(crate) fn is_stale_after(&mut self, limit: Duration) -> bool {
+        self.lasted > limit && !std::mem::replace(&mut self.is_stale, true)
     }
 }
 
@@ -79,6 +85,21 @@ mod tests {
         silence.ends();
         assert_eq!(looks(&mut silence, 60_510, 500), [0; 0]);
         assert_eq!(looks(&mut silence, 61_020, 2_000).len(), 1);
+    }
+
+    #[test]
+    fn sensors_are_stale_once_in_each_silence_and_not_before() {
+        let mut silence = Silence::default();
+        let limit = Duration::from_millis(30);
+        for _ in 0..2 {
+            silence.ends();
+            looks(&mut silence, 0, 30);
+            assert!(!silence.is_stale_after(limit));
+            looks(&mut silence, 30, 10);
+            assert!(silence.is_stale_after(limit));
+            assert!(!silence.is_stale_after(limit));
+            silence.looked = Time(0);
+        }
     }
 
     #[test]
