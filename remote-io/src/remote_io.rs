@@ -311,9 +311,13 @@ impl RemoteIo {
 
     fn take(&mut self, now: Time, input: RemoteIoInput<'_>) {
         match input {
-            RemoteIoInput::Field(sensors) => self.take_sensors(sensors),
+            RemoteIoInput::Field(sensors) => {
+                self.take_sensors(sensors);
+                self.note_stale(false);
+            }
             RemoteIoInput::Points(version) => self.is_read_by(version),
             RemoteIoInput::FieldLost => self.sensors = None,
+            RemoteIoInput::FieldStale => self.note_stale(true),
             RemoteIoInput::Choose(choice) => self.choose(choice),
             RemoteIoInput::Release => self.release(),
             RemoteIoInput::Force(force) => self.force(now, force),

@@ -36,6 +36,8 @@ pub enum RemoteIoInput<'a> {
     Points(ProgramHash),
     /// The values of its sensors are not known.
     FieldLost,
+    /// The values of its sensors are old, and those of the other remote I/O of its program count alone, where that one has modules and is received.
+    FieldStale,
     /// The operator releases the outputs of a program that was started cold.
     Release,
     /// The operator chooses the state that a program continues from.

@@ -302,14 +302,14 @@ impl<M: Machine> Host<'_, M> {
         if let Some(lasted) = lasted {
             let seconds = lasted.as_secs_f64();
             let then = match limit {
-                Some(_) => "the modules of the other remote I/O count alone",
+                Some(_) => "the modules of the other remote I/O count alone, where it is received",
                 None => "the last sensors are sampled",
             };
             let reason = format!("its plant has sent nothing for {seconds:.1} s; {then}");
             self.sink.record(now, Noted::Host(HostEvent::FieldLost { reason }));
         }
         if limit.is_some_and(|limit| round.field_silence.is_stale_after(limit)) {
-            self.machine.handle_input(now, Input::RemoteIo(RemoteIoInput::FieldLost));
+            self.machine.handle_input(now, Input::RemoteIo(RemoteIoInput::FieldStale));
             self.drain(now, round);
         }
     }

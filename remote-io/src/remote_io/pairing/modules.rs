@@ -29,6 +29,8 @@ pub(super) struct Modules {
     /// Samples in a row in which two readings differ until an operator is told.
     discrepancy_cycles: u32,
     inputs: PairedInputs,
+    /// The sensors of this remote I/O are old.
+    is_stale: bool,
     /// The newest inputs of the other one.
     theirs: Option<Readings>,
     /// Outputs that the other one drives, as this author has decided, until they are sent.
@@ -72,6 +74,7 @@ impl Modules {
             discrepancy_cycles,
             distrusted: inputs.distrusted(&settings.paired_inputs),
             inputs,
+            is_stale: false,
             theirs: None,
             driven: None,
             sharing: None,
@@ -102,6 +105,13 @@ impl RemoteIo {
         (is_recent && theirs.inputs.is_some()).then_some(theirs)
     }
 
+    /// Whether its own sensors are old: they are not compared with those of the other one.
+    pub(in crate::remote_io) fn note_stale(&mut self, is_stale: bool) {
+        if let Some(modules) = self.modules() {
+            modules.is_stale = is_stale;
+        }
+    }
+
     /// Whether the sensors are known, by modules of this remote I/O or of the other one.
     pub(in crate::remote_io) fn is_sensed(&self) -> bool {
         self.sensors.is_some() || self.their_readings().is_some()
@@ -114,10 +124,10 @@ impl RemoteIo {
         }
         let theirs = self.their_readings().map(|it| (it.inputs.clone(), it.is_new));
         let (theirs, is_new) = theirs.unwrap_or((None, true));
-        let own = self.sensors.clone();
         let pairing = self.pairing.as_mut()?;
         let is_twin = pairing.settings.is_twin;
         let modules = pairing.modules.as_mut()?;
+        let own = self.sensors.clone().filter(|_| theirs.is_none() || !modules.is_stale);
         if let Some(theirs) = &mut modules.theirs {
             theirs.is_new = false;
         }
@@ -268,7 +278,8 @@ impl RemoteIo {
                 }
             }
             Part::Follower | Part::TakingOver => {
-                Sent::Follower { inputs: self.sensors.clone(), follows: modules.followed.is_some() }
+                let inputs = self.sensors.clone().filter(|_| !modules.is_stale);
+                Sent::Follower { inputs, follows: modules.followed.is_some() }
             }
         })
     }
