@@ -68,7 +68,9 @@ fn check(programs: usize, mode: Mode, network: Network, faults: &[Fault], expect
     let mut digest = Digest(0xcbf2_9ce4_8422_2325);
     simulation
         .run(260, 1000, &mut |time, cycle, member, record| {
-            digest.take(&format!("{time:?} {cycle:?} {member:?} {record:?}\n"));
+            // This key tells nothing where no online change of points is loaded.
+            let record = format!("{record:?}").replace("points: None, ", "");
+            digest.take(&format!("{time:?} {cycle:?} {member:?} {record}\n"));
         })
         .expect("the cluster gets ready");
     digest.take(&format!("{:?}", simulation.tallies()));

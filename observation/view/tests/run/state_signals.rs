@@ -168,12 +168,14 @@ fn a_signal_of_a_state_has_its_declared_type() {
         let place = place.unwrap_or_else(|| panic!("no {name}: {signals:?}"));
         (signals[place].of.as_str(), signals[place].shown(values[place].clone()))
     };
-    let scans = 21;
+    // From the first scan on, which may be one before the origin, up to cycle 20.
+    let is_known = |cycle: &i64| model.state_values(ProgramId(0), *cycle, &signals).is_ok();
+    let scans = 21 - (-9..20).find(is_known).expect("a first scan");
     for (name, of, value) in [
         ("total", "LTIME", json!(scans * 1_000_000)),
         ("plain", "TIME", json!(0)),
         ("bounded", "INT (-3..3)", json!(1)),
-        ("moment", "LDATE_AND_TIME", json!("1970-01-01 00:00:00")),
+        ("moment", "LDATE_AND_TIME", json!("1970-01-01-00:00:00")),
         ("recipe[0].pause", "LTIME", json!(0)),
         ("recipe[1].parts", "INT (1..4)", json!(2)),
         ("recipe[1].mode", "Mode", json!("Manual")),
