@@ -15,7 +15,6 @@ use understudy_cluster::{Cluster, Controller, OnlineChanges, RemoteIo as RemoteI
 use understudy_cycle::OnlineChange;
 use understudy_remote_io::Event as RemoteIo;
 use understudy_simulator::Action;
-use understudy_typed::Points;
 use understudy_wire::{Member, ProgramHash, ProgramId};
 
 use crate::members::Members;
@@ -25,7 +24,7 @@ use crate::rules::Process;
 /// The versions of the programs by whose points a cycle is named.
 #[derive(Debug, Clone)]
 pub struct PointsInEffect {
-    /// By program.
+    /// The version of each program, in the order of the cluster.
     versions: Vec<ProgramHash>,
     /// The cluster with which the run began, with the programs of these versions; without inputs and outputs of one that is not known.
     cluster: Arc<Cluster>,
@@ -50,7 +49,7 @@ impl PointsInEffect {
         &self.cluster
     }
 
-    /// By program.
+    /// The version of each program, in the order of the cluster.
     pub fn versions(&self) -> &[ProgramHash] {
         &self.versions
     }
@@ -220,12 +219,6 @@ impl Present {
 
 /// Whether two versions of a program have the same inputs and outputs at the same places.
 fn have_same_points(old: &Controller, new: &Controller) -> bool {
-    let same = |old: &Points, new: &Points| {
-        old.len() == new.len()
-            && old.iter().zip(new.iter()).all(|(old, new)| {
-                (&old.name, old.bit, old.declared()) == (&new.name, new.bit, new.declared())
-            })
-    };
-    same(&old.interface.inputs, &new.interface.inputs)
-        && same(&old.interface.outputs, &new.interface.outputs)
+    let (old, new) = (&old.interface, &new.interface);
+    old.inputs.are_laid_out_as(&new.inputs) && old.outputs.are_laid_out_as(&new.outputs)
 }

@@ -25,12 +25,20 @@ const LEVELS: usize = 7;
 /// Ranges of each length that are kept, at most.
 const MOST: usize = 512;
 
+/// The least and the greatest value.
+pub type Extremes = (f64, f64);
+
+/// The extremes of both.
+pub(crate) fn widened(one: Extremes, other: Extremes) -> Extremes {
+    (one.0.min(other.0), one.1.max(other.1))
+}
+
 /// Columns of a trend, at most.
 pub const MAXIMUM_COLUMNS: usize = 2000;
 
 /// The images of one program, as ranges.
 #[derive(Debug, Clone)]
-pub struct Coarse {
+pub(crate) struct Coarse {
     /// The points that are no BOOL.
     numbers: Vec<Point>,
     levels: Vec<Level>,
@@ -64,7 +72,7 @@ struct Range {
     all: Box<[u64]>,
     any: Box<[u64]>,
     /// Least and greatest value of each number. A value that is no number counts for nothing.
-    numbers: Box<[(f64, f64)]>,
+    numbers: Box<[Extremes]>,
 }
 
 impl Range {
@@ -77,7 +85,7 @@ impl Range {
             *own |= other;
         }
         for (own, other) in self.numbers.iter_mut().zip(&later.numbers) {
-            *own = (own.0.min(other.0), own.1.max(other.1));
+            *own = widened(*own, *other);
         }
     }
 }
@@ -152,25 +160,25 @@ impl Coarse {
     }
 
     /// The least and the greatest value of a point in each of `count` columns of `width` cycles, from a cycle on; nothing where no value is known.
-    pub fn columns(
+    pub(crate) fn columns(
         &self,
         point: &Point,
         from: i64,
         width: i64,
         count: usize,
-    ) -> Vec<Option<(f64, f64)>> {
+    ) -> Vec<Option<Extremes>> {
         let count = count.min(MAXIMUM_COLUMNS);
         let width = width.max(1);
-        let mut columns: Vec<Option<(f64, f64)>> = vec![None; count];
+        let mut columns: Vec<Option<Extremes>> = vec![None; count];
         let place = |cycle: i64| cycle.saturating_sub(from).div_euclid(width);
         for range in self.ranges(from) {
-            let Some((least, greatest)) = self.extremes(range, point) else {
+            let Some(found) = self.extremes(range, point) else {
                 continue;
             };
             let last = place(range.to - 1).min(count as i64 - 1);
             for column in place(range.from).max(0)..=last {
-                let known = columns[column as usize].get_or_insert((least, greatest));
-                *known = (known.0.min(least), known.1.max(greatest));
+                let known = columns[column as usize].get_or_insert(found);
+                *known = widened(*known, found);
             }
         }
         columns
@@ -187,7 +195,7 @@ impl Coarse {
         closed.chain(open)
     }
 
-    fn extremes(&self, range: &Range, point: &Point) -> Option<(f64, f64)> {
+    fn extremes(&self, range: &Range, point: &Point) -> Option<Extremes> {
         if point.of == Elementary::Bool {
             let bit = |words: &[u64]| {
                 let word = words.get(point.bit as usize / 64)?;
@@ -268,7 +276,7 @@ mod tests {
                     continue;
                 };
                 for (on, level, count) in values {
-                    let within = |range: Option<(f64, f64)>, value: f64| {
+                    let within = |range: Option<Extremes>, value: f64| {
                         range.is_some_and(|(least, greatest)| least <= value && value <= greatest)
                     };
                     assert!(within(ons[column], on as f64), "{from} to {to}: column {column}");

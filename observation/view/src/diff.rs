@@ -160,11 +160,9 @@ fn differing_values(found: &mut Difference, images: [Option<(&Points, &Image)>; 
     let [Some((points, left)), Some((others, right))] = images else {
         return;
     };
-    let are_same = points.len() == others.len()
-        && points.iter().zip(others.iter()).all(|(one, other)| {
-            (&one.name, one.bit, one.declared()) == (&other.name, other.bit, other.declared())
-        });
-    if !are_same || [left, right].iter().any(|it| it.width() != points.width()) {
+    if !points.are_laid_out_as(others)
+        || [left, right].iter().any(|it| it.width() != points.width())
+    {
         return;
     }
     let points = points.iter();

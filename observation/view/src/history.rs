@@ -4,6 +4,7 @@
 //! x(t), u(t) and the lineages before and after, so that a scan can be looked at as its station evaluated it.
 
 mod order;
+mod resets;
 mod step;
 
 use std::collections::VecDeque;
@@ -20,6 +21,7 @@ use understudy_wire::{
 };
 
 use order::Order;
+use resets::Resets;
 pub use step::{Driven, Sampled, Step};
 
 /// The last cycles of one program.
@@ -41,8 +43,7 @@ pub struct History {
     points: ProgramHash,
     /// Whether these points are known; nothing is judged while they are not.
     are_points_known: bool,
-    /// Bit of u(i) that resets a stopped program, of each version with points of its own; nothing of one that never stops.
-    resets: Vec<(ProgramHash, Option<usize>)>,
+    resets: Resets,
     /// Whether steps have gone, or were never seen.
     cut: bool,
     /// The newest samples, while it is not known which state they belong to.
@@ -80,7 +81,6 @@ impl History {
     pub(crate) fn new(cluster: &Cluster, program: ProgramId, most: usize) -> Option<Self> {
         let settings = cluster.remote_io_settings(program)?;
         let executable = cluster.programs().get(program.index())?.executable.clone();
-        let reset = settings.layout.stop.map(|stop| stop.reset);
         Some(Self {
             program,
             by: Member::RemoteIo(program),
@@ -92,7 +92,7 @@ impl History {
             most: most.max(2),
             points: settings.hash,
             are_points_known: true,
-            resets: vec![(settings.hash, reset)],
+            resets: Resets::new(settings.hash, &settings.layout),
             cut: false,
             unplaced: VecDeque::new(),
             awaited: None,
@@ -218,27 +218,7 @@ impl History {
     /// Its program may change by this from now on.
     pub(crate) fn learn(&mut self, change: &Arc<OnlineChange>) {
         self.referee.learn(change);
-        let Some(changed) = change.of(self.program) else {
-            return;
-        };
-        let versions = [changed.before.hash, changed.after.hash];
-        let of_layout = |version| {
-            let layout = change.layout(self.program, version)?;
-            Some(layout.stop.map(|stop| stop.reset))
-        };
-        let known = versions.iter().find_map(|version| self.resets_of(*version)).flatten();
-        for version in versions {
-            // Both have the points of the one that is known where the change replaces none.
-            let reset = of_layout(version).unwrap_or(known);
-            self.resets.retain(|(of, _)| *of != version);
-            self.resets.push((version, reset));
-        }
-        let more = self.resets.len().saturating_sub(MOST_VERSIONS);
-        self.resets.drain(..more);
-    }
-
-    fn resets_of(&self, version: ProgramHash) -> Option<Option<usize>> {
-        self.resets.iter().rev().find(|(of, _)| *of == version).map(|(_, reset)| *reset)
+        self.resets.learn(change, self.program);
     }
 
     /// The points of a version of the program count from now on, which may not be known here.
@@ -325,7 +305,7 @@ impl History {
             let (program, state) = self.referee.taken(*before, &step)?;
             let after = before.after_step(&step);
             let was_stopped = self.fault_in(program, &state).is_some();
-            let reset = self.resets_of(program).flatten();
+            let reset = self.resets.of(program);
             let is_reset = reset.is_some_and(|reset| inputs.get(reset));
             let is_taken_over = self.referee.program_of(*before) != Some(program);
             let keeps_other = was_stopped && !is_reset && (self.has_other_fault || is_taken_over);
@@ -355,7 +335,7 @@ impl History {
     /// The program fault that a state of a program holds.
     fn fault_in(&self, program: ProgramHash, state: &Image) -> Option<Fault> {
         let has_header = state.words().len() >= TypedProgram::HEADER as usize;
-        self.resets_of(program).flatten().filter(|_| has_header)?;
+        self.resets.of(program).filter(|_| has_header)?;
         Fault::read(state.words())
     }
 
@@ -511,9 +491,6 @@ impl History {
 fn is_of(sample: &Event, cycle: Moment) -> bool {
     matches!(sample, Event::Sampled { moment, .. } if *moment == cycle)
 }
-
-/// Versions of a program whose resets are known, at most.
-const MOST_VERSIONS: usize = 64;
 
 /// Lines of different members are so many cycles apart, at most.
 const NEWEST: usize = 64;

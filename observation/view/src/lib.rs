@@ -49,7 +49,7 @@ mod why;
 mod zone;
 
 pub use alarm::{Alarm, AlarmState};
-pub use coarse::{Coarse, MAXIMUM_COLUMNS};
+pub use coarse::{Extremes, MAXIMUM_COLUMNS};
 pub use diff::{Difference, Differing, RunDiff, diff};
 pub use error::ViewError;
 pub use event::{Event, Level};

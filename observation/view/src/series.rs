@@ -10,7 +10,7 @@ use understudy_executable::Interface;
 use understudy_typed::{Point, Points};
 use understudy_wire::{Image, ProgramId, Source, StationId};
 
-use crate::coarse::{Coarse, MAXIMUM_COLUMNS};
+use crate::coarse::{Coarse, Extremes, MAXIMUM_COLUMNS, widened};
 use crate::station::StationState;
 use crate::timeline::{Span, Timeline};
 
@@ -132,16 +132,15 @@ impl Images {
         from: i64,
         width: i64,
         count: usize,
-    ) -> Vec<Option<(f64, f64)>> {
+    ) -> Vec<Option<Extremes>> {
         let mut columns = vec![None; count.min(MAXIMUM_COLUMNS)];
         for (stretch, own) in self.stretches.iter().filter_map(|it| Some((it, it.point(point)?))) {
             let found = stretch.coarse.columns(own, from, width, count);
             for (column, found) in columns.iter_mut().zip(found) {
-                let Some((least, greatest)) = found else {
-                    continue;
+                *column = match (*column, found) {
+                    (Some(known), Some(found)) => Some(widened(known, found)),
+                    (known, found) => known.or(found),
                 };
-                let known: &mut (f64, f64) = column.get_or_insert((least, greatest));
-                *known = (known.0.min(least), known.1.max(greatest));
             }
         }
         columns

@@ -251,6 +251,16 @@ impl Points {
         }
     }
 
+    /// Whether another image has the same points at the same places, whatever their values are before the first scan.
+    pub fn are_laid_out_as(&self, other: &Self) -> bool {
+        let place = |point: &Point| (point.bit, point.declared());
+        self.len() == other.len()
+            && self
+                .iter()
+                .zip(other.iter())
+                .all(|(own, its)| own.name == its.name && place(own) == place(its))
+    }
+
     /// The image of all initial values.
     pub fn initial_image(&self) -> Vec<u64> {
         let mut image = vec![0; self.width().div_ceil(64)];
