@@ -132,13 +132,11 @@ impl Laboratory<'_> {
     }
 
     async fn act(&mut self, member: Member, action: Action) -> Result<Done, Refusal> {
-        let step = Fault {
-            at_cycle: self.account.cycle().map_or(0, |cycle| cycle + 1),
-            phase: 0.0,
-            member,
-            action,
-        };
-        let done = self.do_steps(&[step]).await;
+        self.do_now(member, &[self.step_now(member, action)]).await
+    }
+
+    async fn do_now(&mut self, member: Member, steps: &[Fault]) -> Result<Done, Refusal> {
+        let done = self.do_steps(steps).await;
         let done = done.map(|()| Done::default());
         done.map_err(|error| self.system(member, error))
     }
@@ -152,13 +150,13 @@ impl Laboratory<'_> {
             Member::RemoteIo(_) | Member::Twin(_) => !stations_only && other != member,
             Member::Plant(_) => false,
         });
-        for other in others {
-            for (from, to) in [(member, other), (other, member)] {
-                let action = if cut { Action::Cut { to } } else { Action::Heal { to } };
-                self.act(from, action).await?;
-            }
-        }
-        Ok(Done::default())
+        let pairs = others.flat_map(|other| [(member, other), (other, member)]);
+        let steps = pairs.map(|(from, to)| {
+            let action = if cut { Action::Cut { to } } else { Action::Heal { to } };
+            self.step_now(from, action)
+        });
+        let steps: Vec<Fault> = steps.collect();
+        self.do_now(member, &steps).await
     }
 
     /// Records the texts of a change that a member has loaded, once.

@@ -65,14 +65,15 @@ impl Laboratory<'_> {
         self.processes.get(&member).is_some_and(Process::is_running)
     }
 
+    /// An action that no scenario has asked for, in the cycle that comes next.
+    pub(super) fn step_now(&self, member: Member, action: Action) -> Fault {
+        let at_cycle = self.account.cycle().map_or(0, |cycle| cycle + 1);
+        Fault { at_cycle, phase: 0.0, member, action }
+    }
+
     /// Starts a member that has ended unexpectedly.
     pub(super) async fn restart(&mut self, member: Member) {
-        let step = Fault {
-            at_cycle: self.account.cycle().map_or(0, |cycle| cycle + 1),
-            phase: 0.0,
-            member,
-            action: Action::Restart,
-        };
+        let step = self.step_now(member, Action::Restart);
         if let Err(error) = self.do_steps(&[step]).await {
             let after = self.recovery.ended(member, Instant::now());
             self.show_step(format!("{error}; again in {after:?}"));
