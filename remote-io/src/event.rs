@@ -179,12 +179,13 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         inputs: Option<OldInputs>,
     },
-    /// A station has returned that can prove the state, which was lost or disputed: the program continues.
+    /// The state that was lost or disputed can be proved again: the program continues, and nothing is asked any more.
     StateRecovered {
         /// Current cycle.
         moment: Moment,
-        /// The station that returned.
-        from: StationId,
+        /// The station that has returned with it; none where the other remote I/O of the program has it, or stations have come that decide it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        from: Option<StationId>,
     },
     /// The operator chose a state that is not the newest available one, or where no choice was asked for; or released what waits for a choice.
     ChoiceRefused {

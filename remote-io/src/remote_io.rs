@@ -5,9 +5,9 @@
 //!                                                                  (or holds, then falls safe)
 //! ```
 //!
-//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. What
-//! it knows of the history is one of three states ([`Knowledge`]), and proven outputs are applied on the proof alone or
-//! on the operator's release ([`Authority`]):
+//! It is three machines. [`Inputs`] makes u(i) of a sample, from a list of overlays. [`Arbiter`] knows the history and says who may authorise outputs.
+//! [`Actuation`] drives at every deadline, also when no cycle was started: what is proved, or what was, and then the fail-safe values. What the arbiter
+//! knows of the history is one of three states ([`Knowledge`]), and proven outputs are applied on the proof alone or on the operator's release:
 //!
 //! ```text
 //!   Listening ── a living station holds a state ──────────────► Running from its lineage
@@ -22,10 +22,13 @@
 //!
 //! Invariant *Never back*: the history continues from a state before the floor only if the operator chooses it.
 
+mod actuation;
+mod arbiter;
 mod changing;
 mod deadline;
 mod forcing;
 mod identity;
+mod inputs;
 mod knowledge;
 mod pairing;
 mod points;
@@ -42,29 +45,26 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{
-    Arrival, Descent, Input, Layout, Machine, Output, Outvoted, Participant, RemoteIoInput,
+    Arrival, Input, Layout, Machine, Output, Outvoted, Participant, RemoteIoInput,
 };
 use understudy_wire::{
-    Body, Configurations, Frame, Header, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
-    ProgramHash, ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
+    Body, Configurations, Frame, Header, Holding, Join, Kept, Member, Moment, OrderRefusal,
+    ProgramHash, ProgramId, Recalled, StateChoice, StationId, StationSet, Time,
 };
 
-use crate::diagnosis::Diagnosing;
 use crate::event::{Event, Missing};
 use crate::holders::Holders;
 use crate::selection::Selection;
 use crate::settings::Settings;
-use crate::trust::Trust;
 
+use actuation::{Actuation, Execution};
+use arbiter::{Arbiter, Question};
 use changing::Replacing;
-use forcing::Forcing;
+use inputs::Inputs;
 use knowledge::Knowledge;
 use pairing::Pairing;
-use points::Sensed;
 use protection::Protection;
-use signals::Signals;
 use warm::Noting;
-use writing::Writing;
 
 /// One remote I/O. See [`Machine`] for how it is driven.
 #[derive(Debug, Clone)]
@@ -74,68 +74,25 @@ pub struct RemoteIo {
     layout: Arc<Layout>,
     /// The version of the program whose points these are.
     laid_out: ProgramHash,
-    sensed: Sensed,
     /// The version of a state of a station whose points are not known here; said once.
     unknown_points: Option<ProgramHash>,
     member: Participant<Event>,
-    holders: Holders,
-    knowledge: Knowledge,
-    /// What the operator is asked.
-    question: Option<Question>,
-    authority: Authority,
-    /// What the sensors show; `None` where it is not known: there is no u(i), and the program is not stepped.
-    sensors: Option<Image>,
-    /// What the program sees of it, as of the last sample.
-    field: Image,
+    inputs: Inputs,
+    arbiter: Arbiter,
+    actuation: Actuation,
     /// When the last sample was taken; only said with the outputs.
     sampled_at: Time,
-    diagnosing: Diagnosing,
-    /// Statuses that the diagnosis found to be 1 in the last scan.
-    diagnosed: Image,
-    /// When a cycle was counted last in which the history was looked for.
-    looked: Time,
     protection: Protection,
     /// When the host woke it last too late to keep its times.
     resumed: Option<Time>,
-    forcing: Forcing,
-    writing: Writing,
-    signals: Signals,
     noting: Noting,
     pairing: Option<Pairing>,
     /// The turns of this cycle, by rank.
     turns: Vec<Option<Arc<Frame>>>,
     deadline: Deadline,
-    /// Deadlines in a row at which nothing true was there.
-    missed: u32,
-    applied: Option<Applied>,
-    last_true: Option<Image>,
-    /// The way to the fail-safe values, until all ramps have ended.
-    descent: Option<Descent>,
-    program: Execution,
-    trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
     differed: Vec<(Option<ProgramId>, StationSet)>,
     replacing: Replacing,
-}
-
-/// Who authorises the outputs that are proven.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Authority {
-    /// The proof itself: they are applied.
-    Proof,
-    /// The operator: they are withheld until the release, after a cold start or a value fault.
-    Operator,
-}
-
-/// Whether the program runs, as its proven outputs say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Execution {
-    /// It runs.
-    Running,
-    /// A program fault has stopped it, in all stations at once.
-    Stopped,
-    /// It is stopped, and the next sample resets it.
-    Restarting,
 }
 
 /// Where the next deadline is.
@@ -148,46 +105,6 @@ enum Deadline {
         /// Deadlines that passed without a cycle since the last one that was started.
         idle: u32,
     },
-}
-
-/// What the operator is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Question {
-    /// Which of several states of one cycle the program continues from.
-    Disputed,
-    /// Whether the program continues from a stale state, or cold.
-    StateLost {
-        /// The newest one, as it was reported.
-        told: Option<Moment>,
-        /// The newest one in the last cycle.
-        newest: Option<Moment>,
-    },
-    /// Whether the program starts cold, although members of the cluster have another configuration.
-    ConfigurationDisputed,
-}
-
-/// What was applied at the last deadline.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-struct Applied {
-    source: Source,
-    outputs: Image,
-    missing: Option<Missing>,
-}
-
-impl Applied {
-    /// Whether no station computes the program: its outputs are fail-safe, because none was received that could prove them.
-    fn is_of_no_station(&self) -> bool {
-        let unproved = matches!(
-            self.missing,
-            Some(
-                Missing::NoCycle
-                    | Missing::NotSynchronised
-                    | Missing::TwoErasures
-                    | Missing::SecondFailure
-            )
-        );
-        self.source == Source::FailSafe && unproved
-    }
 }
 
 impl RemoteIo {
@@ -205,36 +122,20 @@ impl RemoteIo {
         let pairing = Pairing::new(now, &settings, holders.stations());
         let mut remote_io = Self {
             member,
-            holders,
+            arbiter: Arbiter::new(now, holders),
+            inputs: Inputs::new(&settings),
+            actuation: Actuation::default(),
             pairing,
-            knowledge: Knowledge::default(),
-            question: None,
-            authority: Authority::Proof,
-            sensors: settings.pair.is_none().then(|| settings.layout.undriven.clone()),
-            field: settings.layout.undriven.clone(),
             sampled_at: now,
-            diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
-            diagnosed: Image::zero(settings.layout.input_width()),
-            looked: now,
             protection: Protection::default(),
             resumed: None,
-            forcing: Forcing::default(),
-            writing: Writing::new(&settings.layout.operator_inputs),
-            signals: Signals::of(&settings.layout),
             noting: Noting::default(),
             turns: vec![None; stations],
             deadline: Deadline::Passed { idle: 0 },
-            missed: 0,
-            applied: None,
-            last_true: None,
-            descent: None,
-            program: Execution::Running,
-            trust: Trust::default(),
             differed: Vec::new(),
             replacing: Replacing::default(),
             layout: Arc::clone(&settings.layout),
             laid_out: settings.hash,
-            sensed: Sensed::new(settings.hash, &settings.layout),
             unknown_points: None,
             settings,
         };
@@ -244,7 +145,7 @@ impl RemoteIo {
 
     /// Whether the operator has to choose the state that the program continues from.
     pub fn asks_operator(&self) -> bool {
-        self.question.is_some()
+        self.arbiter.question.is_some()
     }
 
     fn moment(&self) -> Moment {
@@ -271,7 +172,7 @@ impl RemoteIo {
                 if self.member.admits(now, &frame.header) {
                     let sources = &self.layout.signal_sources;
                     let moment = frame.header.moment;
-                    self.signals.note(sources, program, moment, sample);
+                    self.inputs.signals.note(sources, program, moment, sample);
                 }
                 return;
             }
@@ -280,20 +181,22 @@ impl RemoteIo {
         match self.member.arrival(now, frame) {
             Arrival::Stale => {
                 if self.member.admits(now, &frame.header) {
-                    self.holders.hear(station, own_holding(&frame.body, self.settings.program));
+                    self.arbiter
+                        .holders
+                        .hear(station, own_holding(&frame.body, self.settings.program));
                 }
                 return;
             }
             Arrival::Present => {}
             Arrival::Begins(anchor) => self.begin_cycle(now, frame.header.moment, anchor),
         }
-        self.holders.hear(station, None);
+        self.arbiter.holders.hear(station, None);
         self.note_prepared(station, &frame.header);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note((station, &frame.header), &turn.holdings, None, &turn.recalled);
                 self.learn_program(&frame.header, &turn.holdings);
-                self.holders.hear_of(turn.heard);
+                self.arbiter.holders.hear_of(turn.heard);
                 if turn.relayed.iter().any(|one| one.program == self.settings.program) {
                     self.note_relayed();
                 }
@@ -316,7 +219,7 @@ impl RemoteIo {
                 self.note_stale(false);
             }
             RemoteIoInput::Points(version) => self.is_read_by(version),
-            RemoteIoInput::FieldLost => self.sensors = None,
+            RemoteIoInput::FieldLost => self.inputs.sensors = None,
             RemoteIoInput::FieldStale => self.note_stale(true),
             RemoteIoInput::Choose(choice) => self.choose(choice),
             RemoteIoInput::Release => self.release(),
@@ -329,29 +232,22 @@ impl RemoteIo {
     /// The operator releases the outputs, and all stations that were excluded.
     fn release(&mut self) {
         let moment = self.moment();
-        if self.question == Some(Question::Disputed) {
+        if self.arbiter.question == Some(Question::Disputed) {
             self.report(Event::Released { moment });
             return self.choose(StateChoice::Newest { cycle: None });
         }
-        let waits_for_choice = self.question.is_some();
-        let has_effect = self.program == Execution::Stopped
-            || self.authority == Authority::Operator
-            || !self.trust.is_complete();
+        let waits_for_choice = self.arbiter.question.is_some();
+        let has_effect =
+            self.actuation.execution == Execution::Stopped || self.arbiter.awaits_release();
         if waits_for_choice && !has_effect {
             return self.refuse_choice(OrderRefusal::WaitsForChoice);
         }
-        self.knowledge.pardon();
-        self.diagnosing.release();
+        self.inputs.diagnosing.release();
         self.release_inputs();
-        if self.program == Execution::Stopped {
-            self.program = Execution::Restarting;
+        if self.actuation.release() {
             self.report(Event::Released { moment });
         }
-        if self.authority == Authority::Operator || !self.trust.is_complete() {
-            self.authority = Authority::Proof;
-            self.trust.release();
-            self.report(Event::Released { moment });
-        }
+        self.become_released();
         self.obeyed(Ok(()));
     }
 
@@ -372,14 +268,14 @@ impl RemoteIo {
         let own = own.as_ref();
         if let Some(retained) = retained {
             let retained = retained.iter().find(|kept| kept.holding.program == program);
-            self.holders.note_retained(station, retained);
+            self.arbiter.holders.note_retained(station, retained);
         }
         let recalled = recalled.iter().find(|recalled| recalled.program == program);
         let recalled =
             recalled.map(|recalled| (recalled, self.version_in(header, recalled.version)));
         let recalled = recalled.filter(|(it, version)| self.has_width(&it.inputs, *version));
-        self.holders.note(station, own, recalled, header.alone);
-        if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)
+        self.arbiter.holders.note(station, own, recalled, header.alone);
+        if let (Some(run), Some(holding)) = (self.arbiter.knowledge.run_mut(), own)
             && let Some(place) = run.history.place(holding.lineage)
         {
             run.history.confirm(place);
@@ -391,7 +287,7 @@ impl RemoteIo {
             match self.deadline {
                 Deadline::Ahead if self.slept_through(now, anchor) => {
                     self.miss_signals();
-                    self.missed = self.missed.saturating_add(1);
+                    self.actuation.missed = self.actuation.missed.saturating_add(1);
                 }
                 Deadline::Ahead => self.decide(now),
                 Deadline::Passed { .. } => self.note_lateness(now),
@@ -427,9 +323,9 @@ impl RemoteIo {
 
     fn close_cycle(&mut self) {
         self.member.close_cycle();
-        self.holders.close_cycle();
-        self.writing.close_cycle();
-        if let Some(run) = self.knowledge.run_mut() {
+        self.arbiter.holders.close_cycle();
+        self.inputs.writing.close_cycle();
+        if let Some(run) = self.arbiter.knowledge.run_mut() {
             run.sampled = false;
         }
     }
@@ -462,7 +358,7 @@ impl RemoteIo {
 
     /// Counts the stations with its configuration.
     fn count_votes(&mut self, now: Time, stations: usize) {
-        let is_new = matches!(self.knowledge, Knowledge::Listening { .. });
+        let is_new = matches!(self.arbiter.knowledge, Knowledge::Listening { .. });
         self.member.count_votes(now, stations, is_new);
     }
 }

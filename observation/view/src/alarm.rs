@@ -424,6 +424,11 @@ impl Alarms {
         }
     }
 
+    /// Whether what it is about is not over yet.
+    pub(crate) fn lasts(&self, subject: &Subject) -> bool {
+        self.lasting.contains_key(subject)
+    }
+
     /// These alarms of one member are over.
     pub(crate) fn all_over(&mut self, name: &str, alarms: &[&'static str], cycle: i64) {
         for alarm in alarms {

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::{ChangeOrder, Descent, Fallback, OnlineChange, Output};
+use understudy_cycle::{ChangeOrder, Fallback, OnlineChange, Output};
 use understudy_wire::{
     ChangeName, ConfigurationHash, Configurations, Header, Holding, OrderRefusal, ProgramHash,
-    Source, StationId, StationSet, Time,
+    StationId, StationSet, Time,
 };
 
-use super::{Execution, RemoteIo};
+use super::RemoteIo;
+use super::actuation::Execution;
 use crate::event::Event;
 use crate::history::History;
 
@@ -104,7 +105,7 @@ impl RemoteIo {
 
     /// The program that took the newest sample; none where it is not known.
     pub(super) fn running(&self) -> Option<ProgramHash> {
-        self.knowledge.run().and_then(|run| run.history.program())
+        self.arbiter.knowledge.run().and_then(|run| run.history.program())
     }
 
     /// Whether stations that have loaded what this remote I/O has can execute a program: that of its configuration or the other one of an online
@@ -135,7 +136,7 @@ impl RemoteIo {
             return;
         };
         let own = self.hash();
-        if let Some(run) = self.knowledge.run_mut() {
+        if let Some(run) = self.arbiter.knowledge.run_mut() {
             run.history.learn(own, holding.lineage);
         }
     }
@@ -184,7 +185,7 @@ impl RemoteIo {
             return true;
         }
         let own = self.hash();
-        self.knowledge.run().is_none_or(|run| run.history.is_of(own))
+        self.arbiter.knowledge.run().is_none_or(|run| run.history.is_of(own))
     }
 
     /// A program that is on trial is not accepted yet, and one that was taken back is not accepted at all.
@@ -222,9 +223,9 @@ impl RemoteIo {
             return self.replacing.sampled();
         };
         let left = self.settings.fallback.trial_cycles;
-        let is_tried = self.program == Execution::Running && self.is_tried(to);
+        let is_tried = self.actuation.execution == Execution::Running && self.is_tried(to);
         if let Some(from) = from.filter(|_| is_tried) {
-            self.replacing.trial = Trial::Running { from, left, runs: self.missed == 0 };
+            self.replacing.trial = Trial::Running { from, left, runs: self.actuation.missed == 0 };
         }
     }
 
@@ -233,8 +234,8 @@ impl RemoteIo {
         let Trial::Running { from: to, runs: true, .. } = self.replacing.trial else {
             return;
         };
-        let can_follow = self.holders.stations().any(|station| {
-            self.holders.is_living(station) && self.replacing.prepared.contains(station)
+        let can_follow = self.arbiter.holders.stations().any(|station| {
+            self.arbiter.holders.is_living(station) && self.replacing.prepared.contains(station)
         });
         let (Some(from), true) = (self.running(), can_follow) else {
             return;
@@ -251,7 +252,7 @@ impl RemoteIo {
     fn has_left_behind(&self, change: &OnlineChange) -> bool {
         let changing = self.member.changing();
         let own = self.hash();
-        let runs = self.knowledge.run().is_some_and(|run| run.history.is_of(own));
+        let runs = self.arbiter.knowledge.run().is_some_and(|run| run.history.is_of(own));
         runs && changing.change().is_none() && changing.configurations().own == change.after
     }
 
@@ -276,12 +277,7 @@ impl RemoteIo {
         if fallback == self.settings.fallback {
             return;
         }
-        let applied = self.applied.as_ref().filter(|it| it.source == Source::FailSafe);
-        if let Some(applied) = applied.filter(|_| !fallback.ramps.is_empty()) {
-            self.descent = Some(Descent::new(applied.outputs.clone()));
-        } else {
-            self.descent = None;
-        }
+        self.actuation.take_settings(&fallback);
         // Modules next to those of the other one are released at the end.
         if !self.has_own_modules() {
             self.member.put(Output::EndWith(fallback.fail_safe.clone()));
@@ -295,13 +291,17 @@ impl RemoteIo {
         if !is_changed {
             return Err(OrderRefusal::NotPrepared);
         }
-        let run = self.knowledge.run().ok_or(OrderRefusal::NotRunning)?;
+        let run = self.arbiter.knowledge.run().ok_or(OrderRefusal::NotRunning)?;
         // There is nothing to change, and the stations may have ended the change.
         if run.history.is_of(to) {
             return Ok(());
         }
-        let living: StationSet =
-            self.holders.stations().filter(|station| self.holders.is_living(*station)).collect();
+        let living: StationSet = self
+            .arbiter
+            .holders
+            .stations()
+            .filter(|station| self.arbiter.holders.is_living(*station))
+            .collect();
         let stations = living.without(self.replacing.prepared);
         if stations.is_empty() {
             Ok(())

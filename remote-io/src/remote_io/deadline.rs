@@ -1,10 +1,12 @@
 //! The deadline: something is driven at every one, and only what is true, held, or fail-safe.
 
-use understudy_cycle::{Descent, Output, ValueFault};
-use understudy_wire::{Image, Moment, Source, StationSet, Time};
+use understudy_cycle::{Output, ValueFault};
+use understudy_wire::{Image, Moment, StationSet, Time};
 
+use super::actuation::{Applied, Execution};
+use super::arbiter::{Authority, Question};
 use super::knowledge::Run;
-use super::{Applied, Authority, Deadline, Execution, Question, RemoteIo};
+use super::{Deadline, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::{Received, Selection};
@@ -24,7 +26,7 @@ impl RemoteIo {
         let settings = &self.settings;
         let width = settings.fallback.fail_safe.width();
         let mut accusation = None;
-        let (selection, sampled) = match self.knowledge.run() {
+        let (selection, sampled) = match self.arbiter.knowledge.run() {
             None => (Selection::Missing(Missing::NoHistory), None),
             Some(Run { sampled: false, .. }) if !self.is_sensed() => {
                 (Selection::Missing(Missing::BadQuality), None)
@@ -36,10 +38,15 @@ impl RemoteIo {
             }
             Some(Run { history, .. }) => {
                 let (truth, answer) = (history.head(), settings.fallback.value_fault);
-                let (selected, found) =
-                    received.select(settings.program, truth, width, &mut self.trust, answer);
+                let (selected, found) = received.select(
+                    settings.program,
+                    truth,
+                    width,
+                    &mut self.arbiter.trust,
+                    answer,
+                );
                 accusation = found;
-                let selection = match self.authority {
+                let selection = match self.arbiter.authority {
                     Authority::Proof => selected,
                     Authority::Operator => Selection::Missing(Missing::NotReleased),
                 };
@@ -59,8 +66,7 @@ impl RemoteIo {
         self.report_differences(moment);
         let doubted = matches!(selection, Selection::Missing(Missing::ValueFault));
         if doubted && self.settings.fallback.value_fault == ValueFault::FailSafe {
-            self.authority = Authority::Operator;
-            self.last_true = None;
+            self.become_doubtful();
         }
         // What remote I/Os of other programs would discard as well.
         if late {
@@ -85,7 +91,7 @@ impl RemoteIo {
     pub(super) fn note_lateness(&mut self, now: Time) {
         let passed = self.periods_late(now);
         if passed >= self.settings.fallback.hold_cycles {
-            self.missed = self.missed.max(passed);
+            self.actuation.missed = self.actuation.missed.max(passed);
         }
     }
 
@@ -96,13 +102,11 @@ impl RemoteIo {
         else {
             return selection;
         };
-        if !outputs.get(stop.stopped) {
-            self.program = Execution::Running;
+        let is_stopped = outputs.get(stop.stopped);
+        self.actuation.note_execution(is_stopped);
+        if !is_stopped {
             self.replacing.runs();
             return selection;
-        }
-        if self.program == Execution::Running {
-            self.program = Execution::Stopped;
         }
         self.take_back();
         Selection::Missing(Missing::ProgramFault)
@@ -137,7 +141,7 @@ impl RemoteIo {
 
     /// u(i)(t), which the sensors may have left since.
     pub(super) fn field_sampled(&self, history: &History) -> Image {
-        history.newest().cloned().unwrap_or_else(|| self.field.clone())
+        history.newest().cloned().unwrap_or_else(|| self.inputs.field.clone())
     }
 
     /// Applies the outputs of a deadline, of a cycle in which these stations were received.
@@ -150,45 +154,26 @@ impl RemoteIo {
         if !self.may_drive() {
             return;
         }
-        let (outputs, source, word_of, missing) = match selection {
-            Selection::Direct(outputs) => (outputs, Source::Direct, None, None),
-            Selection::Reconstructed(outputs, understudy) => {
-                (outputs, Source::Reconstructed, Some(understudy), None)
-            }
-            Selection::Missing(missing) => {
-                let missing = match (missing, self.question) {
-                    (
-                        Missing::NotSynchronised | Missing::NoHistory,
-                        Some(Question::StateLost { .. }),
-                    ) => Missing::StateLost,
-                    _ => missing,
-                };
-                self.missed = self.missed.saturating_add(1);
-                let held = self.last_true.clone();
-                match held.filter(|_| self.missed <= self.settings.fallback.hold_cycles) {
-                    Some(outputs) => (outputs, Source::Held, None, Some(missing)),
-                    None => {
-                        self.last_true = None;
-                        (self.descend(), Source::FailSafe, None, Some(missing))
-                    }
-                }
-            }
+        let selection = match (selection, self.arbiter.question) {
+            (
+                Selection::Missing(Missing::NotSynchronised | Missing::NoHistory),
+                Some(Question::StateLost { .. }),
+            ) => Selection::Missing(Missing::StateLost),
+            (selection, _) => selection,
         };
+        let (applied, word_of) = self.actuation.apply(selection, &self.settings.fallback);
+        let Applied { source, outputs, missing } = applied.clone();
         let moment = self.moment();
         if missing.is_none() {
-            self.missed = 0;
-            self.descent = None;
-            self.last_true = Some(outputs.clone());
-            self.knowledge.applied(moment);
+            self.arbiter.knowledge.applied(moment);
             self.note_applied(moment);
             self.report_in_effect(moment);
         } else {
             self.note_not_applied(moment);
         }
-        self.applied = Some(Applied { source, outputs: outputs.clone(), missing });
-        let mut driven = self.forcing.outputs(&outputs);
+        let mut driven = self.inputs.forcing.outputs(&outputs);
         if let Some(stop) = self.layout.stop {
-            driven.set(stop.stopped, self.program != Execution::Running);
+            driven.set(stop.stopped, self.actuation.execution != Execution::Running);
         }
         let outputs_of_modules = self.divide(&driven);
         self.member.put(Output::Drive {
@@ -206,25 +191,6 @@ impl RemoteIo {
             points: self.named(Some(self.laid_out)),
             heard,
         });
-    }
-
-    /// The fail-safe values, or the next outputs on the way to them.
-    fn descend(&mut self) -> Image {
-        let (fail_safe, ramps) = (&self.settings.fallback.fail_safe, &self.settings.fallback.ramps);
-        match &self.applied {
-            Some(applied) if applied.source != Source::FailSafe && !ramps.is_empty() => {
-                self.descent = Some(Descent::new(applied.outputs.clone()));
-            }
-            _ => {}
-        }
-        let Some(descent) = &mut self.descent else {
-            return fail_safe.clone();
-        };
-        let outputs = descent.next(fail_safe, ramps);
-        if outputs == *fail_safe {
-            self.descent = None;
-        }
-        outputs
     }
 
     /// The next deadline: of this cycle, or of one that no station has started in time.

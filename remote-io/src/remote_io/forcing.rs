@@ -25,7 +25,7 @@ struct Active {
 }
 
 impl Forcing {
-    fn put(&mut self, signal: SignalPlace, value: PointValue, until: Time) {
+    pub(super) fn put(&mut self, signal: SignalPlace, value: PointValue, until: Time) {
         self.remove(signal);
         self.active.push(Active { signal, value, until });
     }
@@ -120,11 +120,11 @@ impl RemoteIo {
             return self.obeyed(Err(refusal));
         }
         // The operator sees one force for each bit.
-        while let Some(signal) = self.forcing.remove_overlapping(force) {
+        while let Some(signal) = self.inputs.forcing.remove_overlapping(force) {
             self.report_unforced(signal, false);
         }
         let until = now + Duration::from_secs(u64::from(force.seconds));
-        self.forcing.put(force.signal, force.value, until);
+        self.inputs.forcing.put(force.signal, force.value, until);
         self.report(Event::Forced { moment: self.moment(), force: force.clone() });
         self.obeyed(Ok(()));
     }
@@ -132,7 +132,7 @@ impl RemoteIo {
     /// Ends a force, or refuses that.
     pub(super) fn unforce(&mut self, &Unforce { signal, points }: &Unforce) {
         let refusal = match self.counts_by(points) {
-            true if self.forcing.remove(signal) => {
+            true if self.inputs.forcing.remove(signal) => {
                 self.report_unforced(signal, false);
                 return self.obeyed(Ok(()));
             }
@@ -144,14 +144,14 @@ impl RemoteIo {
     }
 
     pub(super) fn end_forces(&mut self, now: Time) {
-        while let Some(signal) = self.forcing.take_expired(now) {
+        while let Some(signal) = self.inputs.forcing.take_expired(now) {
             self.report_unforced(signal, true);
         }
     }
 
     /// Ends all forces: a force ends with the remote I/O that was given it.
     pub(super) fn end_all_forces(&mut self) {
-        for active in std::mem::take(&mut self.forcing).active {
+        for active in std::mem::take(&mut self.inputs.forcing).active {
             self.report_unforced(active.signal, false);
         }
     }

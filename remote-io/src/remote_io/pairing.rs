@@ -31,14 +31,13 @@ use understudy_wire::{Moment, Pair, Part, Sample, StationId, StationSet, Time};
 
 use modules::Modules;
 
-use super::knowledge::Knowledge;
+use super::RemoteIo;
+use super::actuation::Actuation;
 use super::protection::Protection;
 use super::writing::Writing;
-use super::{Execution, RemoteIo};
 use crate::diagnosis::Diagnosing;
 use crate::event::{Event, PartnerLack};
 use crate::settings::{PairSettings, Settings};
-use crate::trust::Trust;
 
 /// Frames to the other one whose answer counts: those of a few deadlines.
 const AWAITED_ANSWERS: usize = 8;
@@ -343,8 +342,8 @@ impl RemoteIo {
 
     /// The author becomes a follower, as one that has restarted, before it drives anything more.
     fn step_aside(&mut self, now: Time) {
-        let newest = self.knowledge.floor().map(|floor| floor.moment);
-        let gone = self.holders.gone();
+        let newest = self.arbiter.knowledge.floor().map(|floor| floor.moment);
+        let gone = self.arbiter.holders.gone();
         let moment = self.moment();
         let Some(pairing) = &mut self.pairing else {
             return;
@@ -355,20 +354,14 @@ impl RemoteIo {
         pairing.received = None;
         pairing.gone = gone;
         pairing.wait(now);
-        self.knowledge = Knowledge::default();
-        self.question = None;
+        self.become_listening();
         self.protection = Protection::default();
-        self.diagnosing = Diagnosing::new(self.settings.diagnosis.as_deref());
-        let void = self.writing.lose(&self.layout.operator_inputs, moment, |_| true);
+        self.inputs.diagnosing = Diagnosing::new(self.settings.diagnosis.as_deref());
+        let void = self.inputs.writing.lose(&self.layout.operator_inputs, moment, |_| true);
         self.report_void(&void);
-        self.writing = Writing::new(&self.layout.operator_inputs);
+        self.inputs.writing = Writing::new(&self.layout.operator_inputs);
         self.end_all_forces();
-        self.missed = 0;
-        self.applied = None;
-        self.last_true = None;
-        self.descent = None;
-        self.program = Execution::Running;
-        self.trust = Trust::default();
+        self.actuation = Actuation::default();
         self.differed.clear();
         self.give_up_field();
         self.note_distrusted();
@@ -378,7 +371,7 @@ impl RemoteIo {
 
     fn give_up_field(&mut self) {
         if !self.has_own_modules() {
-            self.sensors = None;
+            self.inputs.sensors = None;
             self.member.put(Output::Connect(false));
         }
     }
@@ -419,8 +412,8 @@ impl RemoteIo {
 
     /// For how many cycles no station can have followed another author: each that could has lacked the samples, or is gone.
     fn unfollowed_for(&self, pairing: &Pairing, lacked_for: impl Fn(&Report) -> u32) -> u32 {
-        let gone = pairing.gone.and(self.holders.accounted_for());
-        let is_gone = |station| gone.contains(station) && !self.holders.is_living(station);
+        let gone = pairing.gone.and(self.arbiter.holders.accounted_for());
+        let is_gone = |station| gone.contains(station) && !self.arbiter.holders.is_living(station);
         let able = pairing.reports.iter().filter(|report| !is_gone(report.station));
         able.map(lacked_for).min().unwrap_or(0)
     }

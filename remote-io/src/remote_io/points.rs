@@ -9,19 +9,26 @@
 //! Values of points that stay go with them, by name and type ([`understudy_cycle::Passage`]). Forces end. A history of which it is not known what its
 //! points are is not sampled: no member could tell what a bit of it means.
 
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use understudy_cycle::{Layout, OnlineChange, Output, Passage};
 use understudy_wire::{Header, Holding, Image, PointsHash, ProgramHash, Recalled};
 
-use super::{Execution, RemoteIo};
+use super::RemoteIo;
+use super::actuation::Execution;
 use crate::event::Event;
 
 /// The layout by which the device is read, with the version of the program that it is of.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Sensed {
     version: ProgramHash,
     layout: Arc<Layout>,
+}
+
+/// Two remote I/Os that differ in it alone are not told apart: a device is told of other points before it is read again.
+impl Hash for Sensed {
+    fn hash<H: Hasher>(&self, _: &mut H) {}
 }
 
 impl Sensed {
@@ -131,23 +138,23 @@ impl RemoteIo {
 
     /// The sensors show these values, by the points that the device is read by.
     pub(super) fn take_sensors(&mut self, sensors: &Image) {
-        let Sensed { version, layout } = &self.sensed;
+        let Sensed { version, layout } = &self.inputs.sensed;
         if sensors.width() != layout.input_width() {
             return;
         }
         if *layout == self.layout {
-            self.sensors = Some(sensors.clone());
+            self.inputs.sensors = Some(sensors.clone());
         } else if let Some(passage) = self.passage(*version, self.laid_out) {
             // The device is not told yet, or has not changed yet: new inputs keep what they have.
-            let values = self.sensors.as_ref().unwrap_or(&self.layout.undriven);
-            self.sensors = Some(passage.inputs(sensors, values));
+            let values = self.inputs.sensors.as_ref().unwrap_or(&self.layout.undriven);
+            self.inputs.sensors = Some(passage.inputs(sensors, values));
         }
     }
 
     /// From now on the device is read by the points of a version of the program.
     pub(super) fn is_read_by(&mut self, version: ProgramHash) {
         if let Some(layout) = self.layout_of(version) {
-            self.sensed = Sensed::new(version, layout);
+            self.inputs.sensed = Sensed::new(version, layout);
         }
     }
 
@@ -170,18 +177,19 @@ impl RemoteIo {
         let old = std::mem::replace(&mut self.layout, Arc::clone(passage.to()));
         let layout = Arc::clone(&self.layout);
         // By changes of the program alone, the device may be of an earlier version with the same points.
-        if self.sensed.layout == old {
-            self.sensed.version = from;
+        if self.inputs.sensed.layout == old {
+            self.inputs.sensed.version = from;
         }
         let undriven = &layout.undriven;
-        self.sensors = self.sensors.take().map(|sensors| passage.inputs(&sensors, undriven));
-        self.field = passage.inputs(&self.field, undriven);
-        self.diagnosed = Image::zero(undriven.width());
+        self.inputs.sensors =
+            self.inputs.sensors.take().map(|sensors| passage.inputs(&sensors, undriven));
+        self.inputs.field = passage.inputs(&self.inputs.field, undriven);
+        self.inputs.diagnosed = Image::zero(undriven.width());
         let operated = (&old.operator_inputs[..], &layout.operator_inputs[..]);
-        let void = self.writing.lay_out(operated, moment, &|place| passage.input(place));
-        self.signals.lay_out(&old, &layout, &|place| passage.input(place));
+        let void = self.inputs.writing.lay_out(operated, moment, &|place| passage.input(place));
+        self.inputs.signals.lay_out(&old, &layout, &|place| passage.input(place));
         if layout.stop.is_none() {
-            self.program = Execution::Running;
+            self.actuation.execution = Execution::Running;
         }
         self.member.put(Output::LayOut(version));
         self.carry_outputs(change, passage);
@@ -195,10 +203,10 @@ impl RemoteIo {
         let Some(hash) = points.filter(|points| *points != self.layout.hash) else {
             return;
         };
-        let is_read_by_them = self.sensed.layout == self.layout;
+        let is_read_by_them = self.inputs.sensed.layout == self.layout;
         Arc::make_mut(&mut self.layout).hash = hash;
         if is_read_by_them {
-            self.sensed.layout = Arc::clone(&self.layout);
+            self.inputs.sensed.layout = Arc::clone(&self.layout);
         }
     }
 
@@ -209,10 +217,7 @@ impl RemoteIo {
         let native = native.unwrap_or_else(|| self.settings.fallback.clone());
         let fitted = change.fitted((&native, own), self.settings.program, self.laid_out);
         let moved = |outputs: &Image| passage.outputs(outputs, &fitted.fail_safe);
-        self.last_true = self.last_true.as_ref().map(moved);
-        if let Some(applied) = &mut self.applied {
-            applied.outputs = moved(&applied.outputs);
-        }
+        self.actuation.carry(moved);
         self.take_settings(fitted);
     }
 

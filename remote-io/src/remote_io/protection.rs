@@ -42,7 +42,7 @@ impl Protection {
 impl RemoteIo {
     /// Evaluates the turns of a cycle at its deadline, where it was sampled.
     pub(super) fn watch_protection(&mut self) {
-        if let Some(run) = self.knowledge.run().filter(|run| run.sampled) {
+        if let Some(run) = self.arbiter.knowledge.run().filter(|run| run.sampled) {
             self.note_protection(self.lacking(run.history.head()));
         }
     }
@@ -53,12 +53,12 @@ impl RemoteIo {
         if !self.is_author() {
             return;
         }
-        let all = self.holders.stations();
+        let all = self.arbiter.holders.stations();
         self.note_protection(all.map(|station| Lacking { station, reason }).collect());
     }
 
     fn note_protection(&mut self, lacking: SmallVec<[Lacking; 2]>) {
-        let stations = self.holders.stations().count();
+        let stations = self.arbiter.holders.stations().count();
         if stations < STATIONS_NEEDED {
             return;
         }
@@ -109,14 +109,14 @@ impl RemoteIo {
     /// Stations that do not prove this program's output in this cycle, with the reason; in the paper's mode also failed
     /// stations of other programs.
     fn lacking(&self, head: Lineage) -> SmallVec<[Lacking; 2]> {
-        let own = self.holders.stations().filter_map(|station| {
+        let own = self.arbiter.holders.stations().filter_map(|station| {
             let reason = self.lacks(station, head)?;
             Some(Lacking { station, reason })
         });
         let mut lacking: SmallVec<[Lacking; 2]> = own.collect();
         if self.settings.agreement.mode == Mode::Paper {
             let all = StationSet::first(self.turns.len());
-            let part: StationSet = self.holders.stations().collect();
+            let part: StationSet = self.arbiter.holders.stations().collect();
             let failed = all.without(part).without(self.member.published());
             let reason = LackingReason::Failed;
             lacking.extend(failed.iter().map(|station| Lacking { station, reason }));
@@ -126,12 +126,12 @@ impl RemoteIo {
 
     /// Reason why a station does not prove this program's output in this cycle.
     fn lacks(&self, station: StationId, head: Lineage) -> Option<LackingReason> {
-        if self.trust.excluded().contains(station) {
+        if self.arbiter.trust.excluded().contains(station) {
             return Some(LackingReason::Excluded);
         }
         let Some(turn) = self.turn_of(station) else {
             let joins = self.member.flagged().contains(station);
-            return Some(if joins && self.holders.is_living(station) {
+            return Some(if joins && self.arbiter.holders.is_living(station) {
                 LackingReason::Joining
             } else {
                 LackingReason::NotReceived

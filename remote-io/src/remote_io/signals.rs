@@ -170,7 +170,7 @@ impl RemoteIo {
         let received = self.received();
         let sources = self.layout.signal_sources.iter().enumerate();
         let outputs: Vec<Option<Image>> = sources
-            .map(|(place, source)| self.signals.outputs(place, source, moment, received))
+            .map(|(place, source)| self.inputs.signals.outputs(place, source, moment, received))
             .collect();
         self.age_signals(|program, sources| {
             let place = sources.iter().position(|source| source.program == program)?;
@@ -188,7 +188,7 @@ impl RemoteIo {
         outputs: impl Fn(ProgramId, &[SignalSource]) -> Option<&'a Image>,
     ) {
         let moment = self.moment();
-        let signals = self.layout.signals.iter().zip(&mut self.signals.taken);
+        let signals = self.layout.signals.iter().zip(&mut self.inputs.signals.taken);
         for (signal, taken) in signals {
             match outputs(signal.from, &self.layout.signal_sources) {
                 Some(outputs) => {

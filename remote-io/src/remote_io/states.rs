@@ -17,14 +17,49 @@ use understudy_wire::{
     SamplesReceived, StateChoice, StationId, StationSet, Time, Turn, Word,
 };
 
+use super::RemoteIo;
+use super::arbiter::{Arbiter, Authority, Question};
 use super::knowledge::Knowledge;
-use super::{Authority, Question, RemoteIo};
 use crate::settings::Settings;
 
 const PERIOD: Duration = Duration::from_millis(10);
 const PROGRAM: ProgramId = ProgramId(0);
 /// Cycles of one input: more than any patience of the remote I/O.
 const CYCLES: u64 = 16;
+
+/// A remote I/O of a program with one input and one output, a controller and an understudy.
+pub(super) fn settings() -> Settings {
+    let agreement = Agreement {
+        cluster: ClusterHash(1),
+        configuration: ConfigurationHash(2),
+        schedule: Schedule::new(PERIOD, 1, 1, 1).expect("within the bounds"),
+        mode: Mode::Full,
+        history: 4,
+        flag_after: 3,
+        shadow_cycles: 1,
+        listen_cycles: 2,
+    };
+    Settings {
+        program: PROGRAM,
+        agreement: Arc::new(agreement),
+        hash: ProgramHash(1),
+        layout: Arc::new(Layout::booleans(1, 1)),
+        diagnosis: None,
+        fallback: Fallback {
+            hold_cycles: 2,
+            trial_cycles: 0,
+            fail_safe: Image::zero(1),
+            ramps: Vec::new(),
+            release: Release::Operator,
+            value_fault: ValueFault::FailSafe,
+            stale_state: StaleState::Operator,
+            restart: None,
+        },
+        pair: None,
+        paired_inputs: Vec::new(),
+        shared_outputs: SharedOutputs::default(),
+    }
+}
 
 /// What happens to a remote I/O whose program has a controller and an understudy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,37 +110,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let agreement = Agreement {
-            cluster: ClusterHash(1),
-            configuration: ConfigurationHash(2),
-            schedule: Schedule::new(PERIOD, 1, 1, 1).expect("within the bounds"),
-            mode: Mode::Full,
-            history: 4,
-            flag_after: 3,
-            shadow_cycles: 1,
-            listen_cycles: 2,
-        };
-        let settings = Settings {
-            program: PROGRAM,
-            agreement: Arc::new(agreement),
-            hash: ProgramHash(1),
-            layout: Arc::new(Layout::booleans(1, 1)),
-            diagnosis: None,
-            fallback: Fallback {
-                hold_cycles: 2,
-                trial_cycles: 0,
-                fail_safe: Image::zero(1),
-                ramps: Vec::new(),
-                release: Release::Operator,
-                value_fault: ValueFault::FailSafe,
-                stale_state: StaleState::Operator,
-                restart: None,
-            },
-            pair: None,
-            paired_inputs: Vec::new(),
-            shared_outputs: SharedOutputs::default(),
-        };
-        Self { remote_io: RemoteIo::new(Time(0), settings), cycle: 100 }
+        Self { remote_io: RemoteIo::new(Time(0), settings()), cycle: 100 }
     }
 
     fn happens(&mut self, happening: Happening) {
@@ -217,7 +222,7 @@ impl Bench {
 
     /// The name of its state.
     fn state(&self) -> String {
-        let RemoteIo { knowledge, question, authority, .. } = &self.remote_io;
+        let Arbiter { knowledge, question, authority, .. } = &self.remote_io.arbiter;
         let mut name = match knowledge {
             Knowledge::Listening { .. } => "Listening",
             Knowledge::ColdStarted { .. } => "ColdStarted",

@@ -15,14 +15,14 @@
 //! The history of a warm start begins with a lineage that names the retained state, so a station that has this state follows
 //! it without being asked, and any other one takes a state over as always.
 
-use understudy_cycle::{Output, Release, Restart};
+use understudy_cycle::{Output, Restart};
 use understudy_wire::{
     Configurations, Image, Kept, Lineage, Moment, Note, ProgramHash, Recalled, Retained,
     SamplesReceived, StationId, StationSet,
 };
 
 use super::recovery::Verdict;
-use super::{Authority, Knowledge, RemoteIo};
+use super::{Knowledge, RemoteIo};
 use crate::event::{AskReason, Event, OldInputs};
 use crate::history::History;
 
@@ -93,7 +93,7 @@ impl RemoteIo {
     /// Start of the history that was begun last, where no output of it was applied: no state of it is behind the plant. Of an earlier life, the
     /// other one of two remote I/Os may have applied some.
     fn begun(&self) -> Option<Moment> {
-        let is_alone = self.knowledge.floor().is_none() && self.pairing.is_none();
+        let is_alone = self.arbiter.knowledge.floor().is_none() && self.pairing.is_none();
         let found = self.noting.found.as_ref().filter(|_| is_alone);
         self.noting.begun.or_else(|| found?.begun)
     }
@@ -105,7 +105,7 @@ impl RemoteIo {
 
     /// The newest applied output of a program, and the lineage after its sample.
     fn newest_applied_of(&self, program: ProgramHash) -> Option<(Moment, Lineage)> {
-        match self.knowledge.floor() {
+        match self.arbiter.knowledge.floor() {
             Some(floor) if self.is_loaded(program) => Some((floor.moment, floor.lineage)),
             // Outputs of this program were applied since those of any other one.
             Some(_) => None,
@@ -118,14 +118,14 @@ impl RemoteIo {
 
     /// The cycle of the newest applied output, of an earlier life too.
     pub(super) fn newest_applied(&self) -> Option<Moment> {
-        let floor = self.knowledge.floor().map(|floor| floor.moment);
+        let floor = self.arbiter.knowledge.floor().map(|floor| floor.moment);
         let paired = self.pairing.as_ref().and_then(|pairing| pairing.applied());
         floor.max(self.noted().and_then(Note::applied)).max(paired)
     }
 
     /// The newest applied output whose state a cold start loses. A program that retains nothing loses nothing with the power of the whole plant.
     pub(super) fn lost_by_cold_start(&self) -> Option<Moment> {
-        let floor = self.knowledge.floor().map(|floor| floor.moment);
+        let floor = self.arbiter.knowledge.floor().map(|floor| floor.moment);
         // Where a cold start is configured, it is what was asked for.
         let keeps = self.settings.fallback.restart.is_some_and(|restart| restart != Restart::Cold);
         floor.or(self.newest_applied().filter(|_| keeps))
@@ -135,7 +135,7 @@ impl RemoteIo {
     pub(super) fn has_another_configuration(&self) -> bool {
         let Configurations { own, prepared } = self.member.changing().configurations();
         let found = self.noting.found.as_ref();
-        self.knowledge.floor().is_none()
+        self.arbiter.knowledge.floor().is_none()
             && found.is_some_and(|note| {
                 note.configuration != own && prepared != Some(note.configuration)
             })
@@ -157,10 +157,10 @@ impl RemoteIo {
                 sampled: moment,
                 received: SamplesReceived::Later,
                 applied: Some(moment),
-                excluded: self.trust.excluded(),
+                excluded: self.arbiter.trust.excluded(),
                 accounted_for: StationSet::EMPTY,
-                writes: self.writing.ids(),
-                pulses: self.writing.pulses(&self.layout.operator_inputs),
+                writes: self.inputs.writing.ids(),
+                pulses: self.inputs.writing.pulses(&self.layout.operator_inputs),
                 inputs,
                 version: self.named(Some(self.laid_out)),
             },
@@ -221,7 +221,7 @@ impl RemoteIo {
     pub(super) fn newest_retained(&self) -> Option<(StationId, &Kept)> {
         let applied = self.newest_applied().or_else(|| self.applied_of_another());
         let epoch = self.begun().or(applied).map(|moment| moment.epoch);
-        self.holders.newest_retained(self.noted_exclusions(), epoch)
+        self.arbiter.holders.newest_retained(self.noted_exclusions(), epoch)
     }
 
     /// Stations that were excluded when the power failed. In another configuration, their numbers may be those of other stations.
@@ -256,7 +256,7 @@ impl RemoteIo {
             (_, None) => Verdict::Cold,
             (Restart::Operator, Some((from, kept))) => Verdict::Stale(from, kept.holding),
             (Restart::Warm, Some((from, kept))) => {
-                match self.holders.disputed_retained(excluded, kept) {
+                match self.arbiter.holders.disputed_retained(excluded, kept) {
                     _ if self.is_before_applied(kept) => Verdict::Stale(from, kept.holding),
                     Some(stations) if !self.is_newest_applied(kept) => Verdict::Disputed(stations),
                     _ => Verdict::Warm(from, *kept),
@@ -267,7 +267,7 @@ impl RemoteIo {
 
     /// Why the program does not go on by itself from the newest state that stations hold or have kept.
     pub(super) fn reason_to_ask(&self) -> AskReason {
-        let retained = self.newest_retained().filter(|_| self.holders.newest().is_none());
+        let retained = self.newest_retained().filter(|_| self.arbiter.holders.newest().is_none());
         match (retained, self.settings.fallback.restart) {
             (Some((_, kept)), _) if !kept.is_whole => AskReason::NotWhole,
             (Some((_, kept)), Some(Restart::Operator)) if !self.is_before_applied(kept) => {
@@ -289,7 +289,7 @@ impl RemoteIo {
         let state = &kept.holding;
         // Without a note of its program, it is not known what was applied.
         let is_known = kept.is_whole && !self.has_unknown_exclusions();
-        let recalled = self.holders.newest_recalled();
+        let recalled = self.arbiter.holders.newest_recalled();
         if !is_known || recalled.is_some_and(|recalled| recalled > state.stepped) {
             return true;
         }
@@ -307,9 +307,7 @@ impl RemoteIo {
 
     /// Starts to sample from the initial state with the retentive values of a retained one.
     pub(super) fn start_warm(&mut self, moment: Moment, (from, kept): (StationId, Kept)) {
-        let awaits_release = self.settings.fallback.release == Release::Operator;
-        self.authority = if awaits_release { Authority::Operator } else { Authority::Proof };
-        self.last_true = None;
+        let awaits_release = self.become_started();
         let applied = self.newest_applied_of(kept.of).map(|(applied, _)| applied);
         let stepped = kept.holding.stepped;
         let lost = applied.filter(|applied| applied.epoch == stepped.epoch);
@@ -353,7 +351,7 @@ impl RemoteIo {
 
     /// Whether no history has been sampled in this life: the operator inputs have no values yet.
     pub(super) fn is_first_start(&self) -> bool {
-        matches!(self.knowledge, Knowledge::Listening { .. })
+        matches!(self.arbiter.knowledge, Knowledge::Listening { .. })
     }
 
     /// The newest note that has the inputs of its program, with the version of the program whose points these are, where a change replaces them.
@@ -376,7 +374,7 @@ impl RemoteIo {
             self.recalled_by_these_points(Recalled { version, ..note.recalled.clone() })
         });
         if let Some(recalled) = noted {
-            self.writing.start(&self.layout.operator_inputs, &recalled);
+            self.inputs.writing.start(&self.layout.operator_inputs, &recalled);
         }
     }
 }

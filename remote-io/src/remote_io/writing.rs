@@ -22,7 +22,8 @@ use understudy_wire::{
 };
 
 use self::sessions::{Progress, Session, Sessions};
-use super::{Applied, RemoteIo};
+use super::RemoteIo;
+use super::actuation::Applied;
 use crate::event::Event;
 use crate::history::History;
 use understudy_cycle::{OperatorInput, OperatorInputKind, ValueMismatch};
@@ -464,25 +465,25 @@ impl RemoteIo {
         let moment = self.moment();
         let period = self.settings.agreement.schedule.period().as_nanos().max(1);
         let memory = u32::try_from(REMEMBERED_FOR.as_nanos().div_ceil(period));
-        self.writing.sessions.forget(memory.unwrap_or(u32::MAX));
-        let runs = self.knowledge.run().is_some()
-            && self.sensors.is_some()
-            && self.question.is_none()
-            && !self.applied.as_ref().is_some_and(Applied::is_of_no_station);
+        self.inputs.writing.sessions.forget(memory.unwrap_or(u32::MAX));
+        let runs = self.arbiter.knowledge.run().is_some()
+            && self.inputs.sensors.is_some()
+            && self.arbiter.question.is_none()
+            && !self.actuation.applied.as_ref().is_some_and(Applied::is_of_no_station);
         let inputs = &self.layout.operator_inputs;
         let counts = self.counts_by(write.points);
-        let taken = match self.writing.known((inputs, counts), write) {
+        let taken = match self.inputs.writing.known((inputs, counts), write) {
             Some(known) => known,
             None if !counts => Err(WriteRefusal::OtherPoints),
             None if runs => {
-                let forced = |input| self.forcing.refuses_write(input, now);
-                self.writing.take(inputs, write, &forced)
+                let forced = |input| self.inputs.forcing.refuses_write(input, now);
+                self.inputs.writing.take(inputs, write, &forced)
             }
             None => Err(WriteRefusal::NotRunning),
         };
         match taken {
             Ok(Taking::New) => self.report(Event::Written { moment, write: write.clone() }),
-            Ok(Taking::Pending) => self.writing.sessions.asked_again(write),
+            Ok(Taking::Pending) => self.inputs.writing.sessions.asked_again(write),
             Ok(Taking::InEffect(since)) => {
                 let id = write.id;
                 self.report(Event::WriteInEffect { moment, id, since });
@@ -506,7 +507,7 @@ impl RemoteIo {
 
     /// Answers writes of which outputs were applied.
     pub(super) fn report_in_effect(&mut self, moment: Moment) {
-        for (id, since) in self.writing.applied(moment) {
+        for (id, since) in self.inputs.writing.applied(moment) {
             self.report(Event::WriteInEffect { moment, id, since });
             self.answer(id, WriteOutcome::InEffect { since });
         }

@@ -3,12 +3,12 @@
 use understudy_cycle::{Input, Output, RemoteIoInput};
 use understudy_remote_io::{Event, Missing, PairSettings, Release, Settings};
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Frame, Header, Image, Lineage, Member, Part, ProgramSet,
-    Sample, Source, StationSet, Step, Turn,
+    Body, ClusterHash, ConfigurationHash, Frame, Header, Image, Join, Lineage, Member, Part,
+    ProgramSet, Sample, Source, StationSet, Step, Turn,
 };
 
 use crate::bench::{
-    Bench, PROGRAM, Said, held_after, recalled_of, releasing, sample_of, settings, turn,
+    Bench, PROGRAM, Said, held_after, join, recalled_of, releasing, sample_of, settings, turn,
 };
 
 /// The twin of a program with a controller and an understudy.
@@ -124,4 +124,43 @@ fn outputs_that_were_not_released_stay_so() {
     assert_eq!(applied(&all), [(Source::FailSafe, Some(Missing::NotReleased)); 4]);
     assert_eq!(applied(&taken_over(Release::Operator, true)), [(Source::Direct, None); 4]);
     assert_eq!(applied(&taken_over(Release::Automatic, false)), [(Source::Direct, None); 4]);
+}
+
+/// A follower that receives neither the author nor a station that follows it asks the operator. The author comes: nothing is asked any more, and the journal
+/// says so, since the author itself has nothing to report.
+#[test]
+fn a_question_that_the_author_ends_is_reported_as_over() {
+    let mut bench = Bench::new(twin(Release::Automatic), 100);
+    let states = |said: &Said| -> Vec<Event> {
+        let events = said.iter().filter_map(|output| match output {
+            Output::Report(event) => Some(event.clone()),
+            _ => None,
+        });
+        let is_of_state =
+            |event: &Event| matches!(event, Event::StateLost { .. } | Event::StateRecovered { .. });
+        events.filter(is_of_state).collect()
+    };
+    // A station that receives no author, and one that is not received and might.
+    let Body::Join(unfollowing) = join(None, None) else { unreachable!("a join") };
+    let unfollowing = Join { lacks: ProgramSet::only(PROGRAM), ..unfollowing };
+    let mut asked = Vec::new();
+    for _ in 0..700 {
+        bench.cycle += 1;
+        let mut said = bench.receive(bench.start(), 0, false, Body::Sync);
+        let body = Body::Join(unfollowing.clone());
+        said.extend(bench.receive(bench.start(), 0, false, body));
+        said.extend(bench.decide());
+        asked.extend(states(&said));
+    }
+    assert!(matches!(asked[..], [Event::StateLost { asks: true, .. }]), "{asked:?}");
+    assert!(bench.remote_io.asks_operator());
+    bench.cycle += 1;
+    bench.receive(bench.start(), 0, false, Body::Sync);
+    let author = sample(&bench, Lineage(7), true);
+    let moment = bench.moment();
+    let said = from_author(&mut bench, &author);
+    assert_eq!(states(&said), [Event::StateRecovered { moment, from: None }]);
+    assert!(!bench.remote_io.asks_operator());
+    let said = from_author(&mut bench, &author);
+    assert_eq!(states(&said), []);
 }

@@ -275,7 +275,7 @@ impl Dice<'_> {
                 reason: Default::default(),
                 inputs: None,
             },
-            7 => RemoteIoEvent::StateRecovered { moment, from: station },
+            7 => RemoteIoEvent::StateRecovered { moment, from: Some(station) },
             8 => RemoteIoEvent::StartedCold { born: moment, awaits_release: true, lost: None },
             9 => RemoteIoEvent::Released { moment },
             10 => RemoteIoEvent::ValueFault {

@@ -96,7 +96,10 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         state_lost_text(*applied, newest, *asks, (*reason, *inputs))
     };
     StateRecovered { from, .. } => "state-recovered" Notice
-        format!("{} has returned with the state of its program", name(*from, members));
+        match from {
+            Some(from) => format!("{} has returned with the state of its program", name(*from, members)),
+            None => "the state of its program is there again: no choice is needed".to_owned(),
+        };
     ChoiceRefused { refusal, .. } => "choice-refused" Warning format!("refuses the operator's choice: {refusal}");
     Protected { .. } => "protected" Notice
         "its program is protected: the failure of one station would be masked";

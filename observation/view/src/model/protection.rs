@@ -133,11 +133,18 @@ impl Model {
             | RemoteIoEvent::AdoptedLineage { .. }
             | RemoteIoEvent::StartedCold { .. }
             | RemoteIoEvent::StartedWarm { .. } => {
+                self.alarms.over(&subject(STATE_LOST), cycle);
                 let standing = self.changes.now().program(program);
-                if standing.is_some_and(|own| own.lost.is_some()) {
+                let is_lost = standing.is_some_and(|own| own.lost.is_some());
+                // Of two remote I/Os, the other one may ask too.
+                let answers = matches!(event, RemoteIoEvent::StateRecovered { from: None, .. });
+                let other = record.member.and_then(Member::partner);
+                let other = other.map(|other| self.members().name(other).to_owned());
+                let still_asks =
+                    answers && other.is_some_and(|other| self.alarms.lasts(&(other, STATE_LOST)));
+                if is_lost && !still_asks {
                     self.lost_is(program, cycle, None);
                 }
-                self.alarms.over(&subject(STATE_LOST), cycle);
             }
             _ => {}
         }

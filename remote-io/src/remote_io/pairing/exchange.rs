@@ -44,7 +44,7 @@ impl RemoteIo {
             pairing.received = Some(sample.clone());
         }
         pairing.is_bound(now);
-        self.question = None;
+        self.become_answered(None);
         self.follow_again(now);
     }
 
@@ -85,7 +85,7 @@ impl RemoteIo {
             return self.step_aside(now);
         }
         if binds {
-            self.question = None;
+            self.become_answered(None);
             self.follow_again(now);
         }
         self.receive_modules(now, theirs);
@@ -127,7 +127,7 @@ impl RemoteIo {
         let holding = Holding::of(holdings, program);
         let stepped = holding.map(|holding| holding.stepped);
         let lacks = lacks.contains(program) && stepped != Some(moment);
-        let run = self.knowledge.run().filter(|run| run.sampled);
+        let run = self.arbiter.knowledge.run().filter(|run| run.sampled);
         let head = run.map(|run| run.history.head());
         let follows = holding.is_some_and(|holding| Some(holding.lineage) == head);
         self.note_follower(station, (lacks, follows), stepped);

@@ -114,20 +114,20 @@ impl RemoteIo {
 
     /// Whether the sensors are known, by modules of this remote I/O or of the other one.
     pub(in crate::remote_io) fn is_sensed(&self) -> bool {
-        self.sensors.is_some() || self.their_readings().is_some()
+        self.inputs.sensors.is_some() || self.their_readings().is_some()
     }
 
     /// What the sensors show; `None` where it is not known. Called once for each sample.
     pub(in crate::remote_io) fn read_field(&mut self) -> Option<Image> {
         if !self.has_own_modules() {
-            return self.sensors.clone();
+            return self.inputs.sensors.clone();
         }
         let theirs = self.their_readings().map(|it| (it.inputs.clone(), it.is_new));
         let (theirs, is_new) = theirs.unwrap_or((None, true));
         let pairing = self.pairing.as_mut()?;
         let is_twin = pairing.settings.is_twin;
         let modules = pairing.modules.as_mut()?;
-        let own = self.sensors.clone().filter(|_| theirs.is_none() || !modules.is_stale);
+        let own = self.inputs.sensors.clone().filter(|_| theirs.is_none() || !modules.is_stale);
         if let Some(theirs) = &mut modules.theirs {
             theirs.is_new = false;
         }
@@ -198,7 +198,7 @@ impl RemoteIo {
 
     /// Divides what this author drives between the modules of both. What its own drive; the other one is sent its part.
     pub(in crate::remote_io) fn divide(&mut self, driven: &Image) -> Image {
-        let is_of_use = [self.sensors.is_some(), self.is_followed_by_modules()];
+        let is_of_use = [self.inputs.sensors.is_some(), self.is_followed_by_modules()];
         let period = self.period();
         let shared = &self.settings.shared_outputs;
         let Some(pairing) = &mut self.pairing else {
@@ -278,7 +278,7 @@ impl RemoteIo {
                 }
             }
             Part::Follower | Part::TakingOver => {
-                let inputs = self.sensors.clone().filter(|_| !modules.is_stale);
+                let inputs = self.inputs.sensors.clone().filter(|_| !modules.is_stale);
                 Sent::Follower { inputs, follows: modules.followed.is_some() }
             }
         })

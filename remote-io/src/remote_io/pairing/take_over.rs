@@ -2,7 +2,8 @@
 
 use understudy_wire::{Part, Time};
 
-use super::super::{Deadline, Question, RemoteIo};
+use super::super::arbiter::Question;
+use super::super::{Deadline, RemoteIo};
 use super::{FIRST_LOSS_TIME, IDLE_PATIENCE, LOSS_PATIENCE, LOSS_TIME, Pairing, Report};
 use crate::event::{AskReason, Event};
 
@@ -70,7 +71,7 @@ impl RemoteIo {
             !pairing.receives_stations && pairing.idle > pairing.settings.take_over_after
         };
         let is_cut_off = self.pairing.as_ref().is_some_and(is_cut_off);
-        if !(is_idle || is_cut_off) || !has_partner || self.question.is_some() {
+        if !(is_idle || is_cut_off) || !has_partner || self.arbiter.question.is_some() {
             return;
         }
         if let Some(pairing) = &mut self.pairing {
@@ -106,7 +107,7 @@ impl RemoteIo {
                 pairing.refused = 0;
                 // Those that were missing have come, so the question is over: what they hold decides.
                 if std::mem::take(&mut pairing.asks) {
-                    self.question = None;
+                    self.become_answered(None);
                 }
                 self.connect_field();
                 self.report_part();
@@ -127,21 +128,21 @@ impl RemoteIo {
     /// time, so the other one has its time to come first.
     fn ask_who_begins(&mut self, refused: u32) {
         let patience = self.settings.agreement.listen_cycles.saturating_mul(5);
-        let gone = self.holders.gone_after().max(patience);
+        let gone = self.arbiter.holders.gone_after().max(patience);
         let Some(pairing) = &mut self.pairing else {
             return;
         };
         let is_awaited = !pairing.partner.is_known && !pairing.partner.is_lost;
-        if refused <= gone || is_awaited || self.question.is_some() {
+        if refused <= gone || is_awaited || self.arbiter.question.is_some() {
             return;
         }
         pairing.asks = true;
         let (moment, applied) = (self.moment(), self.newest_applied());
-        let newest = self.holders.newest().map(|(from, holding)| (from, holding.stepped));
+        let newest = self.arbiter.holders.newest().map(|(from, holding)| (from, holding.stepped));
         let (holder, newest) = newest.unzip();
-        self.question = Some(Question::StateLost { told: newest, newest });
         let (asks, reason) = (true, AskReason::Unreceived);
         let inputs = None;
-        self.report(Event::StateLost { moment, applied, newest, holder, asks, reason, inputs });
+        let event = Event::StateLost { moment, applied, newest, holder, asks, reason, inputs };
+        self.become_asking(Question::StateLost { told: newest, newest }, event);
     }
 }
