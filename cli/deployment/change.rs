@@ -264,7 +264,7 @@ fn needs_stop(reasons: &[NeedsStop]) -> Answer {
     let groups = [
         (
             "U0630",
-            "the change needs a stop, since an online change replaces programs, and what remote I/Os do where nothing is proved, only: make these settings equal in both files, or stop the cluster and start all members with the new file",
+            "the change needs a stop, since an online change replaces programs with their inputs and outputs, and what remote I/Os do where nothing is proved, only: make these settings equal in both files, or stop the cluster and start all members with the new file",
         ),
         ("U0637", "variables cannot be renamed so: correct `renamed` of the new file"),
     ];

@@ -194,3 +194,46 @@ fn the_plan_lists_settings_and_what_needs_a_stop_beside_them() {
     assert_eq!(equal.status, 2, "{}", equal.output);
     assert!(equal.errors.contains("there is nothing to change"), "{}", equal.errors);
 }
+
+/// The plan lists inputs and outputs that change, and compares the outputs that both programs have with the same type: `valve` does the same, and `lamp` does
+/// not, by an input that only the new program has.
+#[test]
+fn the_plan_lists_points_and_compares_those_that_stay() {
+    let folder = empty_folder("change_points");
+    let old = "PROGRAM one\n VAR_INPUT start : BOOL; level : INT; END_VAR\n VAR_OUTPUT valve, lamp : BOOL; shown : INT; END_VAR\n\
+               valve := start; lamp := start; shown := level;\nEND_PROGRAM\n";
+    let new = "PROGRAM one\n VAR_INPUT more : BOOL; start : BOOL; level : REAL; END_VAR\n VAR_OUTPUT shown : REAL; lamp, valve : BOOL; END_VAR\n\
+               valve := start; lamp := start AND more; shown := level;\nEND_PROGRAM\n";
+    write(&folder, "old", old);
+    write_with(&folder, "new", new, "fail_safe = { shown = 1.5 }");
+    let change = ["change", "old/cluster.toml", "new/cluster.toml", "--drop"];
+    let answer = understudy_in(&folder, &change);
+    assert_eq!(answer.status, 0, "{}", answer.errors);
+    for line in [
+        "  new        input more  BOOL",
+        "  retyped    input level  INT to REAL, its value is not kept",
+        "  retyped    output shown  INT to REAL, its value is not kept",
+        "one: proved equal but for `lamp`, from every state of the old program on",
+    ] {
+        assert!(answer.output.lines().any(|it| it == line), "{line}: {}", answer.output);
+    }
+    let json = understudy_in(&folder, &[&change[..], &["--json"]].concat()).json();
+    assert_eq!(verdict(&json, "valve")["verdict"], "equal", "{json}");
+    let lamp = verdict(&json, "lamp");
+    assert_eq!(lamp["verdict"], "differs", "{json}");
+    let last = lamp["run"]["differs_in_scan"].as_u64().expect("a scan") as usize;
+    assert_eq!(lamp["run"]["signals"]["more"][last], false, "{lamp}");
+    let outputs = json["result"]["differences"][0]["outputs"].as_array().expect("outputs");
+    assert!(outputs.iter().all(|output| output["output"] != "shown"), "{json}");
+    let points = json["result"]["plan"][0]["points"].as_array().expect("points");
+    let shown = points.iter().find(|point| point["point"] == "shown").expect("it is listed");
+    assert_eq!((&shown["side"], &shown["fate"]), (&"output".into(), &"retyped".into()), "{json}");
+    // Not with a twin.
+    let twin = "twin = { name = \"second\", wiring = \"exclusive\" }";
+    write_with(&folder, "old", old, twin);
+    write_with(&folder, "new", new, twin);
+    let refused = understudy_in(&folder, &change);
+    assert_eq!(refused.status, 2, "{}", refused.output);
+    let why = "error[U0630]: the inputs or outputs of `one` cannot change while it runs: its remote I/O has a twin";
+    assert!(refused.errors.contains(why), "{}", refused.errors);
+}

@@ -146,6 +146,11 @@ impl Side {
         self.cluster.controllers()[0].hash
     }
 
+    /// Width of the outputs in bits.
+    fn width(&self) -> usize {
+        self.cluster.controllers()[0].interface.outputs.width()
+    }
+
     /// The value of an output in the words of an image.
     fn output(&self, event: &Value, name: &str) -> u64 {
         let words = event["outputs"]["words"].as_array().expect("words");
@@ -172,7 +177,7 @@ impl Cell {
         let out = empty_folder(name);
         let before = Side::write(&out.join("before"), BEFORE, before);
         let after = Side::write(&out.join("after"), AFTER, after);
-        let texts = ChangeTexts::with_points(&before.cluster, &after.cluster);
+        let texts = ChangeTexts::between(&before.cluster, &after.cluster);
         let texts = texts.expect("an online change");
         let runs = out.join("runs");
         let more = ["--cycles", "100000", "--allow-commands"];
@@ -373,6 +378,46 @@ fn points_change_while_a_station_is_dead() {
     cell.records.wait_for("protection", |record| is(record, "drive-io", "protected"));
     let applied = cell.cancel();
     assert_eq!(applied["source"], "direct", "{applied}");
+    let missed = cell.end();
+    assert!(missed.is_empty(), "{missed:?}");
+}
+
+/// The steps of the tool, with what it refuses meanwhile: orders by the old file reach no signal after the switch, and the change is accepted.
+#[test]
+fn the_tool_changes_points() {
+    let _one = some_at_a_time();
+    let mut cell = Cell::start("points_tool", FAIL_SAFE_BEFORE, FAIL_SAFE_AFTER);
+    let run = cell.run.to_str().expect("text").to_owned();
+    let after = cell.after.file.to_str().expect("text").to_owned();
+    let done = |step: &str| {
+        let (exit, document, errors) = answer(&["change", &run, &after, step, "--drop"]);
+        assert_eq!(exit, 0, "{step}: {document:#} {errors}");
+    };
+    let force = |signal: &str| {
+        let (exit, document, _) = answer(&["operate", &run, "--name", "drive-io", "force", signal]);
+        (exit, document["failures"][0]["code"].as_str().map(str::to_owned))
+    };
+    done("prepare");
+    assert_eq!(force("gone=99"), (0, None));
+    done("switch");
+    let changed = |record: &Value| is(record, "drive-io", "points-changed");
+    cell.records.wait_for("the change of the points", changed);
+    let unknown = (2, Some("U0556".to_owned()));
+    assert_eq!(force("gone=98"), unknown);
+    done("cancel");
+    cell.records.wait_for("the change back", changed);
+    assert_eq!(force("gone=97"), (0, None));
+    done("prepare");
+    done("accept");
+    cell.records.wait_for("the change again", changed);
+    let shown = |record: &Value| {
+        let event = &record["event"];
+        is(record, "drive-io", "applied") && event["outputs"]["width"] == cell.after.width()
+    };
+    let applied = cell.records.wait_for("the outputs of the new program", shown);
+    let event = &applied["event"];
+    assert_eq!(cell.after.output(event, "extra"), cell.after.output(event, "shown"), "{applied}");
+    assert_eq!(force("gone=96"), unknown);
     let missed = cell.end();
     assert!(missed.is_empty(), "{missed:?}");
 }

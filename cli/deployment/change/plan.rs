@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use understudy_cluster::{
-    ChangeTexts, ChangedInitial, ChangedSetting, Cluster, changed_fallbacks, changed_initials,
-    done_pairs, fates,
+    ChangeTexts, ChangedInitial, ChangedPoint, ChangedSetting, Cluster, PointFate,
+    changed_fallbacks, changed_initials, changed_points, done_pairs, fates,
 };
 use understudy_typed::{CarriedPath, Fate, Renamed};
 
@@ -25,6 +25,8 @@ struct PlannedProgram {
     name: String,
     paths: Vec<CarriedPath>,
     initials: Vec<ChangedInitial>,
+    /// Inputs and outputs that change.
+    points: Vec<ChangedPoint>,
     /// Pairs that rename nothing any more.
     done: Vec<Renamed>,
 }
@@ -36,8 +38,9 @@ impl Plan {
             let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
             let paths = fates(&old.code, &new.code);
             let initials = changed_initials(&old.code, &new.code, &paths);
+            let points = changed_points(before, after, changed.program);
             let done = done_pairs(&old.code, &new.code);
-            PlannedProgram { name: new.name.clone(), paths, initials, done }
+            PlannedProgram { name: new.name.clone(), paths, initials, points, done }
         });
         Self { programs: programs.collect(), settings: changed_fallbacks(before, after, texts) }
     }
@@ -67,7 +70,7 @@ impl Plan {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        for PlannedProgram { name, paths, initials, done } in &self.programs {
+        for PlannedProgram { name, paths, initials, points, done } in &self.programs {
             let count = |fate| paths.iter().filter(|path| path.fate == fate).count();
             let _ = writeln!(
                 text,
@@ -99,6 +102,9 @@ impl Plan {
                     "  {}: the initial value changes{values}, which counts at the next start only",
                     initial.path
                 );
+            }
+            for point in points {
+                let _ = writeln!(text, "  {}", point_text(point));
             }
             for (before, now) in done {
                 let _ = writeln!(
@@ -136,7 +142,7 @@ impl Plan {
 
     pub(super) fn json(&self) -> Value {
         let programs =
-            self.programs.iter().map(|PlannedProgram { name, paths, initials, done }| {
+            self.programs.iter().map(|PlannedProgram { name, paths, initials, points, done }| {
                 let paths = paths.iter().map(|path| {
                     json!({
                         "path": path.path,
@@ -156,6 +162,7 @@ impl Plan {
                 json!({
                     "program": name,
                     "paths": paths.collect::<Vec<_>>(),
+                    "points": points.iter().map(point_json).collect::<Vec<_>>(),
                     "initial_values": initials.collect::<Vec<_>>(),
                     "renamed_before": done.iter().map(|(_, now)| now).collect::<Vec<_>>(),
                 })
@@ -174,4 +181,47 @@ impl Plan {
         });
         Answer::done(text, result)
     }
+}
+
+/// What becomes of a point, in one word.
+fn word(fate: &PointFate) -> &'static str {
+    match fate {
+        PointFate::New(..) => "new",
+        PointFate::Removed(..) => "removed",
+        PointFate::Retyped(_) => "retyped",
+        PointFate::Moved(_) => "moved",
+        PointFate::Sourced => "sourced",
+    }
+}
+
+fn point_text(ChangedPoint { name, is_output, fate }: &ChangedPoint) -> String {
+    let side = if *is_output { "output" } else { "input" };
+    let told = match fate {
+        PointFate::New(of, None) | PointFate::Removed(of, None) => of.clone(),
+        PointFate::New(of, Some(value)) => format!("{of}, fail-safe {value}"),
+        PointFate::Removed(of, Some(value)) => format!("{of}, is left with {value}"),
+        PointFate::Retyped([before, now]) => format!("{before} to {now}, its value is not kept"),
+        PointFate::Moved([before, now]) => format!("{before} to {now}"),
+        PointFate::Sourced => format!("`inputs.{name}` of the cluster file changes"),
+    };
+    format!("{:<9}  {side} {name}  {told}", word(fate))
+}
+
+fn point_json(ChangedPoint { name, is_output, fate }: &ChangedPoint) -> Value {
+    let [before, now, fail_safe] = match fate.clone() {
+        PointFate::New(of, value) => [None, Some(of), value],
+        PointFate::Removed(of, value) => [Some(of), None, value],
+        PointFate::Retyped([before, now]) | PointFate::Moved([before, now]) => {
+            [Some(before), Some(now), None]
+        }
+        PointFate::Sourced => [None, None, None],
+    };
+    json!({
+        "point": name,
+        "side": if *is_output { "output" } else { "input" },
+        "fate": word(fate),
+        "before": before,
+        "now": now,
+        "fail_safe": fail_safe.map(|value| value.replace('`', "")),
+    })
 }

@@ -136,12 +136,20 @@ impl Rehearsal {
         self.running = Some(running);
     }
 
-    /// The outputs of the new program from a state of its own.
+    /// The outputs of the new program from a state of its own, at the places of the old one; an input that only the new one has keeps its initial value.
     fn step(&mut self, state: &mut [u64], sampled: &Sampled) -> Image {
-        let mut outputs = Image::zero(sampled.outputs.width());
+        let points = self.change.points.as_deref();
+        let inputs =
+            points.map(|points| points.forward().inputs(&sampled.inputs, &points.after.initial()));
+        let inputs = inputs.as_ref().unwrap_or(&sampled.inputs);
         let executable = &self.change.after.executable;
-        executable.step(&mut self.scratch, state, sampled.inputs.words(), outputs.words_mut());
-        outputs
+        let mut outputs = Image::zero(executable.output_count());
+        executable.step(&mut self.scratch, state, inputs.words(), outputs.words_mut());
+        // An output that only one of the two programs has is not compared.
+        match points {
+            Some(points) => points.back().outputs(&outputs, &sampled.outputs),
+            None => outputs,
+        }
     }
 
     fn compare(&mut self, cycle: i64, scans: u32, sampled: &Sampled, outputs: &Image) {

@@ -19,10 +19,13 @@ use understudy_executable::Interface;
 use understudy_typed::{Fault, Program as TypedProgram, Renamed, Successor};
 use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
-use self::differences::{Difference, Points, differences};
+use self::differences::{Difference, differences};
 pub use self::error::ChangeError;
 pub use self::fallback::{ChangedFallback, FallbackText};
-pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_pairs, fates};
+pub use self::plan::{
+    ChangedInitial, ChangedPoint, PointFate, changed_fallbacks, changed_initials, changed_points,
+    done_pairs, fates,
+};
 pub use self::points::{ChangedPoints, FixedPoints, change_with_points, same_point};
 pub use self::settings::ChangedSetting;
 pub use self::unfit::{PairReason, Unfit};
@@ -189,15 +192,7 @@ impl ChangeTexts {
     /// # Errors
     /// Why it needs a stop.
     pub fn between(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
-        differences(before, after, Points::Stay).map(|found| Self::of(before, after, found))
-    }
-
-    /// The change from one cluster file to another one, in which points may differ.
-    ///
-    /// # Errors
-    /// Why it needs a stop.
-    pub fn with_points(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
-        differences(before, after, Points::MayChange).map(|found| Self::of(before, after, found))
+        differences(before, after).map(|found| Self::of(before, after, found))
     }
 
     fn of(before: &Cluster, after: &Cluster, differences: Vec<Difference>) -> Self {

@@ -369,7 +369,7 @@ mod tests {
         };
         let before = with("y", "y = \"coil:1\"");
         let after = with("z, y", "y = \"coil:2\", z = \"coil:1\"");
-        let texts = ChangeTexts::with_points(&before, &after).expect("an online change");
+        let texts = ChangeTexts::between(&before, &after).expect("an online change");
         let json = serde_json::to_string(&texts).expect("JSON");
         let folder = std::env::temp_dir().join(format!("understudy-points-{}", std::process::id()));
         fs::create_dir_all(&folder).expect("a folder");
@@ -414,7 +414,7 @@ mod tests {
         };
         let before = with("a, b", &[key("a", true), key("b", false)].join(", "));
         let after = with("c, a", &[key("a", true), key("c", true)].join(", "));
-        let texts = ChangeTexts::with_points(&before, &after).expect("an online change");
+        let texts = ChangeTexts::between(&before, &after).expect("an online change");
         let folder = std::env::temp_dir().join(format!("understudy-inputs-{}", std::process::id()));
         let (_, mut keeper) = start(&folder.join("kept.one.change"), &before);
         keeper.load(&serde_json::to_string(&texts).expect("JSON")).expect("it is of this cluster");

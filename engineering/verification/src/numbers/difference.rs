@@ -28,7 +28,8 @@ impl Difference {
     ) -> Result<Self, InTheWay> {
         let system = System::of_change(before, after, switch)?;
         let model = Model::of(system, 0, &Asked::default())?;
-        let outputs = after.outputs.iter().map(|point| {
+        let compared = after.outputs.iter().filter(|it| System::is_compared(before, it));
+        let outputs = compared.map(|point| {
             let equal = model.alike(&point.name, point.of, switch);
             (point.name.clone(), equal.always())
         });

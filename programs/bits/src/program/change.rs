@@ -16,7 +16,7 @@ mod times;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use understudy_typed::{Comparison, Elementary, Operation, Origin, Program, Taken};
+use understudy_typed::{Comparison, Elementary, Operation, Origin, Point, Program, Taken};
 
 use super::{Outputs, together};
 use crate::System;
@@ -112,8 +112,8 @@ impl System {
     /// The BOOL that is TRUE from the switch on.
     pub const CHANGED: &'static str = "changed";
 
-    /// `before` and `after` on the same inputs, within their subranges. Outputs are named `old.` and `new.`, then their names; `differs.` and an output is
-    /// TRUE where the two differ after the switch.
+    /// `before` and `after` on the same inputs, within their subranges; an input that only one of them has, or that has another type, may be any. Outputs are named `old.` and `new.`, then their names; `differs.` and an output
+    /// that both have is TRUE where the two differ after the switch.
     ///
     /// # Errors
     /// What is in the way.
@@ -160,6 +160,12 @@ impl System {
         format!("{DIFFERS}{output}")
     }
 
+    /// Whether an output of the new program is one of the old program too, of the same type. A program that reports no fault has none.
+    pub fn is_compared(before: &Program, output: &Point) -> bool {
+        let old = before.outputs.find(&output.name);
+        old.map_or(output.name == Program::FAULT, |old| old.of == output.of)
+    }
+
     /// The names of an output in the old and in the new program.
     pub fn both_of(output: &str) -> [String; 2] {
         [OLD, NEW].map(|prefix| format!("{prefix}{output}"))
@@ -175,11 +181,16 @@ impl System {
         let points = before.inputs.iter().filter(|point| point.slot != 0);
         let sources: Vec<Source> = points.map(Source::declared).collect();
         let given = super::sources_as_terms(self, "", &before.inputs, &sources);
-        let known: BTreeMap<&str, Term> =
-            before.inputs.iter().map(|point| point.name.as_str()).zip(given.clone()).collect();
-        let of_new = after.inputs.iter().map(|point| match known.get(point.name.as_str()) {
-            Some(&term) => term,
-            None => self.input(point.name.clone(), point.of, None),
+        let known: BTreeMap<(&str, Elementary), Term> =
+            before.inputs.iter().map(|it| (it.name.as_str(), it.of)).zip(given.clone()).collect();
+        let of_new = after.inputs.iter().map(|point| {
+            if let Some(&term) = known.get(&(point.name.as_str(), point.of)) {
+                return term;
+            }
+            // An input of another type is another one.
+            let is_known = before.inputs.find(&point.name).is_some();
+            let prefix = if is_known { NEW } else { "" };
+            self.input(format!("{prefix}{}", point.name), point.of, None)
         });
         let of_new: Vec<Term> = of_new.collect();
         if let Switch::Now { before, .. } = switch {
@@ -431,7 +442,8 @@ impl System {
         self.numbers.clear();
         self.observed.push((Self::CHANGED.to_owned(), changed));
         let stopped = self.terms.boolean(false);
-        for point in &both.new.program.outputs {
+        let outputs = both.new.program.outputs.iter();
+        for point in outputs.filter(|point| Self::is_compared(both.old.program, point)) {
             let of = |side: &Side<'_>| side.outputs.points.get(&point.name).copied();
             let [old, new] = [&both.old, &both.new].map(|side| of(side).unwrap_or(stopped));
             let apart = match point.of {

@@ -8,15 +8,6 @@ use super::settings::{ChangedSetting, changed_settings};
 use super::{ChangedFallback, NeedsStop, Unfit};
 use crate::cluster::Cluster;
 
-/// What is done with inputs and outputs that differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Points {
-    /// They need a stop.
-    Stay,
-    /// They change with their program.
-    MayChange,
-}
-
 /// What differs of one program.
 pub(super) struct Difference {
     pub(super) program: ProgramId,
@@ -34,19 +25,17 @@ pub(super) struct Difference {
 pub(super) fn differences(
     before: &Cluster,
     after: &Cluster,
-    points: Points,
 ) -> Result<Vec<Difference>, Vec<NeedsStop>> {
     if before.name() != after.name() {
         let (before, after) = (before.name().to_owned(), after.name().to_owned());
         return Err(vec![NeedsStop::OtherCluster { before, after }]);
     }
-    let may_change = points == Points::MayChange;
     let both = || before.controllers.iter().zip(&after.controllers);
     let replaced = both().zip(&before.remote_ios).filter(|((old, new), _)| old.hash != new.hash);
     let of_replaced: Vec<String> =
         replaced.map(|(_, remote_io)| format!("remote I/O `{}`", remote_io.name)).collect();
     // Where the inputs of a program come from is a part of its points.
-    let is_of_points = |setting: &ChangedSetting| matches!(setting, ChangedSetting::Key { of, key, .. } if may_change && key == "`inputs`" && of_replaced.contains(of));
+    let is_of_points = |setting: &ChangedSetting| matches!(setting, ChangedSetting::Key { of, key, .. } if key == "`inputs`" && of_replaced.contains(of));
     let changed = changed_settings(&before.frame_text, &after.frame_text);
     let others = changed.into_iter().filter(|setting| !is_of_points(setting));
     let mut reasons: Vec<NeedsStop> = others.map(NeedsStop::Setting).collect();
@@ -55,20 +44,14 @@ pub(super) fn differences(
         if old.name != new.name {
             continue;
         }
-        let (mut moved, mut fallback) = (None, None);
-        let unfit: Vec<Unfit> = if may_change {
-            moved = points_change(before, after, program);
-            let fixed = moved.as_ref().map(|_| fixed_points(before, after, program));
-            let fixed = fixed.into_iter().flatten();
-            fixed.map(|why| Unfit::Fixed { program: old.name.clone(), why }).collect()
-        } else {
-            Unfit::points(&old.name, &old.code, &new.code).into_iter().collect()
-        };
-        // The fail-safe values of other outputs are others.
-        let is_compared = may_change || unfit.is_empty();
-        reasons.extend(unfit.into_iter().map(NeedsStop::from));
+        let points = points_change(before, after, program);
+        let fixed = points.as_ref().map(|_| fixed_points(before, after, program));
+        let fixed = fixed.into_iter().flatten();
+        let fixed = fixed.map(|why| Unfit::Fixed { program: old.name.clone(), why });
+        reasons.extend(fixed.map(NeedsStop::from));
+        let mut fallback = None;
         let remote_ios = [before, after].map(|cluster| cluster.remote_ios.get(program.index()));
-        if let ([Some(one), Some(other)], true) = (remote_ios, is_compared) {
+        if let [Some(one), Some(other)] = remote_ios {
             match ChangedFallback::between(program, one, other) {
                 Ok(changed) => fallback = changed,
                 Err(changed) => reasons.push(NeedsStop::Setting(changed)),
@@ -81,7 +64,7 @@ pub(super) fn differences(
             reasons.extend(unfit.map(NeedsStop::from));
         }
         if is_replaced || fallback.is_some() {
-            differences.push(Difference { program, is_replaced, points: moved, fallback });
+            differences.push(Difference { program, is_replaced, points, fallback });
         }
     }
     if reasons.is_empty() { Ok(differences) } else { Err(reasons) }

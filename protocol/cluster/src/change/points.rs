@@ -84,7 +84,7 @@ pub fn change_with_points(
     after: &Cluster,
 ) -> Result<OnlineChange, Vec<NeedsStop>> {
     let (mut programs, mut fallbacks) = (Vec::new(), Vec::new());
-    for difference in differences(before, after, super::Points::MayChange)? {
+    for difference in differences(before, after)? {
         let Difference { program, is_replaced, points, fallback } = difference;
         if points.is_some() || fallback.is_some() {
             let settings = |cluster: &Cluster| cluster.remote_ios[program.index()].fallback.clone();
@@ -233,13 +233,9 @@ pub(super) fn points_change(
     })
 }
 
-/// The point that a point of one version of a program is in another one: that of its name and type. An enumeration is of the same type where its names have
-/// the same numbers.
+/// The point that a point of one version of a program is in another one: that of its name and type.
 pub fn same_point<'a>(point: &Point, others: &'a Points) -> Option<&'a Point> {
-    let whole = |point: &Point| Declared { range: None, ..point.declared() };
-    let other = others.find(&point.name)?;
-    let stays = whole(point).takes(&whole(other)) && whole(other).takes(&whole(point));
-    stays.then_some(other)
+    others.find(&point.name).filter(|other| stays(point, other))
 }
 
 /// Points of both.
@@ -249,6 +245,12 @@ fn moved(old: &Points, new: &Points) -> Vec<Moved> {
         Some(Moved { before: PointPlace::of(before), after: PointPlace::of(after) })
     });
     moved.collect()
+}
+
+/// Whether a point of the same name is of the same type; an enumeration is where its names have the same numbers.
+pub(super) fn stays(before: &Point, after: &Point) -> bool {
+    let [before, after] = [before, after].map(|it| Declared { range: None, ..it.declared() });
+    before.takes(&after) && after.takes(&before)
 }
 
 /// Why the points of a program cannot change while it runs.
