@@ -98,7 +98,8 @@ fn a_program_with_other_points_is_rehearsed_by_those_that_stay() {
     let inputs = "more : REAL; level : INT := 3;";
     let same = program(inputs, outputs, "extra := 1.0; shown := count; sum := level;");
     let other = program(inputs, outputs, "extra := 1.0; shown := count + 1; sum := level;");
-    for (name, text) in [("old", &old), ("same", &same), ("other", &other)] {
+    let lone = program(inputs, "extra : LREAL; shown : LREAL;", "extra := 1.0;");
+    for (name, text) in [("old", &old), ("same", &same), ("other", &other), ("lone", &lone)] {
         fs::create_dir(folder.join(name)).expect("a folder");
         fs::write(folder.join(name).join("cluster.toml"), cluster).expect("written");
         fs::write(folder.join(name).join("one.st"), text).expect("written");
@@ -116,6 +117,12 @@ fn a_program_with_other_points_is_rehearsed_by_those_that_stay() {
     };
     let (exit, found) = rehearsed("same");
     assert_eq!((exit, &found["differing"]), (0, &Value::from(0)), "{found:#}");
+    assert_eq!(found["compared"], serde_json::json!(["shown", "sum"]), "{found:#}");
+    assert_eq!(found["not_compared"], serde_json::json!(["extra"]), "{found:#}");
+    let told = understudy_in(&folder, &["change", "runs/latest", "same/cluster.toml", "rehearse"]);
+    assert!(told.output.contains("equal in shown, sum\n  not compared: extra"), "{}", told.output);
+    let none = understudy_in(&folder, &["change", "runs/latest", "lone/cluster.toml", "rehearse"]);
+    assert!(none.status == 2 && none.errors.contains("no output of `one`"), "{}", none.shown());
     let (exit, found) = rehearsed("other");
     let outputs: Vec<&String> = found["outputs"].as_object().expect("outputs").keys().collect();
     assert_eq!((exit, &outputs[..]), (1, &[&"shown".to_owned()][..]), "{found:#}");

@@ -1,9 +1,12 @@
 //! An online change between two cluster files: what it replaces, and why it needs a stop where it does.
 
+mod common;
 mod differences;
 mod error;
 mod fallback;
+mod later;
 mod plan;
+mod point_fates;
 mod points;
 mod settings;
 mod unfit;
@@ -19,16 +22,16 @@ use understudy_executable::Interface;
 use understudy_typed::{Fault, Program as TypedProgram, Renamed, Successor};
 use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
+pub use self::common::{CommonPoints, input_name_after, same_point};
 use self::differences::{Difference, differences};
 pub use self::error::ChangeError;
 pub use self::fallback::{ChangedFallback, FallbackText};
-pub use self::plan::{
-    ChangedInitial, ChangedPoint, PointFate, changed_fallbacks, changed_initials, changed_points,
-    done_pairs, fates,
-};
-pub use self::points::{ChangedPoints, FixedPoints, change_with_points, same_point};
+pub use self::later::later_settings;
+pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_pairs, fates};
+pub use self::point_fates::{ChangedPoint, PointFate, changed_points};
+pub use self::points::{ChangedPoints, FixedPoints, change_with_points};
 pub use self::settings::ChangedSetting;
-pub use self::unfit::{PairReason, Unfit};
+pub use self::unfit::{PairReason, PointList, Unfit};
 use crate::canonical::points_hash;
 use crate::cluster::{Cluster, Controller};
 use crate::code::Code;

@@ -140,7 +140,7 @@ impl RemoteIo {
         } else if let Some(passage) = self.passage(*version, self.laid_out) {
             // The device is not told yet, or has not changed yet: new inputs keep what they have.
             let values = self.sensors.as_ref().unwrap_or(&self.layout.undriven);
-            self.sensors = Some(passage.inputs(sensors, values));
+            self.sensors = Some(passage.field_inputs(layout, sensors, values));
         }
     }
 
@@ -167,18 +167,21 @@ impl RemoteIo {
         };
         let moment = self.moment();
         self.end_all_forces();
+        let unforced = self.unforced_inputs();
         let old = std::mem::replace(&mut self.layout, Arc::clone(passage.to()));
         let layout = Arc::clone(&self.layout);
+        // An input that comes from elsewhere now has its newest value until the first one from there.
+        let newest = passage.inputs(&unforced, &layout.undriven);
         // By changes of the program alone, the device may be of an earlier version with the same points.
         if self.sensed.layout == old {
             self.sensed.version = from;
         }
-        let undriven = &layout.undriven;
-        self.sensors = self.sensors.take().map(|sensors| passage.inputs(&sensors, undriven));
-        self.field = passage.inputs(&self.field, undriven);
-        self.diagnosed = Image::zero(undriven.width());
+        let shown = |sensors: &Image| passage.field_inputs(&old, sensors, &newest);
+        self.sensors = self.sensors.as_ref().map(shown);
+        self.field = shown(&self.field);
+        self.diagnosed = Image::zero(layout.input_width());
         let operated = (&old.operator_inputs[..], &layout.operator_inputs[..]);
-        let void = self.writing.lay_out(operated, moment, &|place| passage.input(place));
+        let void = self.writing.lay_out(operated, moment, (passage, &newest));
         self.signals.lay_out(&old, &layout, &|place| passage.input(place));
         if layout.stop.is_none() {
             self.program = Execution::Running;
@@ -188,6 +191,14 @@ impl RemoteIo {
         self.report(Event::PointsChanged { moment, from, to: version });
         self.report_void(&void);
         true
+    }
+
+    /// The newest u(i) without forces, by the points that count.
+    fn unforced_inputs(&self) -> Image {
+        let mut inputs = self.field.clone();
+        self.writing.put(&self.layout.operator_inputs, None, &mut inputs);
+        self.signals.put_newest(&self.layout.signals, &mut inputs);
+        inputs
     }
 
     /// The points stay, and are those of another version.

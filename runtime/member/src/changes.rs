@@ -272,13 +272,15 @@ impl ChangeKeeper for Keeper {
     }
 }
 
-/// The places of points before and after a change that replaces those of the member's program.
+/// The places of points before and after a change that replaces those of the member's program; those of the member's own cluster file are the ones that it has.
 fn learn(wirings: &Wirings, cluster: &Cluster, texts: &ChangeTexts) {
     if texts.points.iter().any(|changed| wirings.are_of(changed)) {
-        let both = [texts.before, texts.after];
-        both.into_iter()
-            .filter_map(|it| cluster.changed(texts, it).ok())
-            .for_each(|it| wirings.learn(&it));
+        let own = cluster.agreement().configuration;
+        let both = [texts.before, texts.after].map(|side| match side == own {
+            true => Some(cluster.clone()),
+            false => cluster.changed(texts, side).ok(),
+        });
+        both.into_iter().flatten().for_each(|it| wirings.learn(&it));
     }
 }
 

@@ -367,7 +367,8 @@ fn settings_that_need_a_stop_are_named_as_in_the_file() {
         (
             remote_io,
             with("inputs = { a = { operator = \"level\" } }"),
-            "`inputs` of remote I/O `one-io` changes",
+            "inputs or outputs of `one` change, and its program does not: only a changed program brings others while it runs (sourced input a  from: the \
+             field; now: level, initial FALSE)",
         ),
         (
             "[[remote_io]]",
