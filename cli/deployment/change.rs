@@ -12,13 +12,14 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum, value_parser};
 use serde_json::{Value, json};
 use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides};
+use understudy_journal::kept_overrides;
 use understudy_text::duration::parse_positive;
-use understudy_view::Run;
+use understudy_view::{Run, ViewError};
 use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal};
 
 use self::difference::{Differences, newest_states};
 use self::members::{Members, gives};
-use self::plan::{NOTHING, Plan};
+use self::plan::Plan;
 use crate::answer::{Answer, Status};
 use crate::files;
 
@@ -106,23 +107,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         Some(run) => run.cluster().as_ref().clone(),
         None => files::cluster(&arguments.before, Overrides::default())?.0,
     };
-    let (after, used) = files::cluster(&arguments.after, Overrides::default())?;
+    // What the command line of a run said in place of its file, it says in place of the new one too.
+    let said = run.as_ref().map(|run| kept_overrides(run.path())).transpose();
+    let said = said.map_err(ViewError::from)?.unwrap_or_default();
+    let (after, used) = files::cluster(&arguments.after, said)?;
     let texts = ChangeTexts::between(&before, &after).map_err(|reasons| needs_stop(&reasons))?;
     let plan = Plan::of(&before, &after, &texts);
     if arguments.step == Step::Plan {
         let live = run.as_ref().and_then(newest_states);
         let budget = arguments.budget;
-        let differences = Differences::of(&before, &after, &texts, live.as_ref(), budget);
+        let differences = Differences::of((&before, &after), &texts, live.as_ref(), budget);
         return Ok(plan.answer(&differences).with_used(used));
     }
     if texts.touched().is_empty() {
-        return Err(Answer::failed(Status::BadInput, "U0630", NOTHING.to_owned()));
+        return Err(Answer::failed(Status::BadInput, "U0630", plan.nothing()));
     }
     if texts.programs.is_empty() && matches!(arguments.step, Step::Rehearse | Step::Switch) {
         return Ok(Answer::done(NO_PROGRAM, json!({ "rehearsed": [], "members": [], "plan": [] })));
     }
     if arguments.step == Step::Rehearse {
-        return rehearsal::rehearse(arguments, run.as_ref(), &before, &texts);
+        return rehearsal::rehearse(arguments, run.as_ref(), (&before, &after), &texts);
     }
     let members = Members::of(arguments, &before)?;
     match arguments.step {
@@ -264,7 +268,7 @@ fn needs_stop(reasons: &[NeedsStop]) -> Answer {
     let groups = [
         (
             "U0630",
-            "the change needs a stop, since an online change replaces programs, and what remote I/Os do where nothing is proved, only: make these settings equal in both files, or stop the cluster and start all members with the new file",
+            "the change needs a stop, since an online change replaces programs with their inputs and outputs, and what remote I/Os do where nothing is proved, only: make these settings equal in both files, or stop the cluster and start all members with the new file",
         ),
         ("U0637", "variables cannot be renamed so: correct `renamed` of the new file"),
     ];

@@ -382,7 +382,7 @@ impl Account {
         };
         let version = self.terms.present.controller(program);
         let outputs = version.map(|version| version.interface.outputs.clone());
-        let changes = self.alarms.fold.lay_out(program, version);
+        let changes = self.alarms.fold.lay_out(program, &self.terms.present);
         self.alarms_changed(&changes, None);
         let number = moment(&record.event).and_then(|moment| self.numbering.of(moment));
         let from = number.and_then(|number| self.since_origin(number)).or(self.next_cycle());

@@ -194,3 +194,132 @@ fn the_plan_lists_settings_and_what_needs_a_stop_beside_them() {
     assert_eq!(equal.status, 2, "{}", equal.output);
     assert!(equal.errors.contains("there is nothing to change"), "{}", equal.errors);
 }
+
+/// The plan lists inputs and outputs that change, and compares the outputs that both programs have with the same type: `valve` does the same, and `lamp` does
+/// not, by an input that only the new program has.
+#[test]
+fn the_plan_lists_points_and_compares_those_that_stay() {
+    let folder = empty_folder("change_points");
+    let old = "PROGRAM one\n VAR_INPUT start : BOOL; level : INT; END_VAR\n VAR_OUTPUT valve, lamp : BOOL; shown : INT; END_VAR\n\
+               valve := start; lamp := start; shown := level;\nEND_PROGRAM\n";
+    let new = "PROGRAM one\n VAR_INPUT more : BOOL; start : BOOL; level : REAL; END_VAR\n VAR_OUTPUT shown : REAL; lamp, valve : BOOL; END_VAR\n\
+               valve := start; lamp := start AND more; shown := level;\nEND_PROGRAM\n";
+    write(&folder, "old", old);
+    write_with(&folder, "new", new, "fail_safe = { shown = 1.5 }");
+    let change = ["change", "old/cluster.toml", "new/cluster.toml", "--drop"];
+    let answer = understudy_in(&folder, &change);
+    assert_eq!(answer.status, 0, "{}", answer.errors);
+    for line in [
+        "  new        input more  BOOL",
+        "  retyped    input level  INT to REAL, its value is not kept",
+        "  retyped    output shown  INT to REAL, its value is not kept, fail-safe `1.5`",
+        "one: proved equal in `valve`, not in `lamp`, from every state of the old program on",
+        "  not compared: `shown` has another type",
+    ] {
+        assert!(answer.output.lines().any(|it| it == line), "{line}: {}", answer.output);
+    }
+    let json = understudy_in(&folder, &[&change[..], &["--json"]].concat()).json();
+    assert_eq!(verdict(&json, "valve")["verdict"], "equal", "{json}");
+    let lamp = verdict(&json, "lamp");
+    assert_eq!(lamp["verdict"], "differs", "{json}");
+    let last = lamp["run"]["differs_in_scan"].as_u64().expect("a scan") as usize;
+    assert_eq!(lamp["run"]["signals"]["more"][last], false, "{lamp}");
+    let outputs = json["result"]["differences"][0]["outputs"].as_array().expect("outputs");
+    assert!(outputs.iter().all(|output| output["output"] != "shown"), "{json}");
+    let points = json["result"]["plan"][0]["points"].as_array().expect("points");
+    let shown = points.iter().find(|point| point["point"] == "shown").expect("it is listed");
+    assert_eq!((&shown["side"], &shown["fate"]), (&"output".into(), &"retyped".into()), "{json}");
+    // Not with a twin.
+    let twin = "twin = { name = \"second\", wiring = \"exclusive\" }";
+    write_with(&folder, "old", old, twin);
+    write_with(&folder, "new", new, twin);
+    let refused = understudy_in(&folder, &change);
+    assert_eq!(refused.status, 2, "{}", refused.output);
+    let why = "error[U0630]: the inputs or outputs of `one` cannot change while it runs: its remote I/O has a twin";
+    assert!(refused.errors.contains(why), "{}", refused.errors);
+}
+
+/// Outputs with other names are compared by the declared pairs, with the inputs that have other names; those that the two programs do not have in common are
+/// named, and nothing is said of all outputs then. An enumeration whose names have other numbers is another point on both sides.
+#[test]
+fn the_proof_says_which_outputs_it_compares() {
+    let folder = empty_folder("change_compared");
+    let program = |types: &str, input: &str, outputs: &str, body: &str| {
+        format!(
+            "{types}PROGRAM one\n VAR_INPUT {input}; END_VAR\n VAR_OUTPUT {outputs} END_VAR\n {body}\nEND_PROGRAM\n"
+        )
+    };
+    let check = |[old, new]: [&str; 2], renamed: &str, told: &[&str], verdicts: &[(&str, &str)]| {
+        write(&folder, "old", old);
+        write(&folder, "new", new);
+        let file = folder.join("new/cluster.toml");
+        let text = fs::read_to_string(&file).expect("it was written");
+        let pairs = format!("ladder = \"one.st\"\nrenamed = {{ {renamed} }}");
+        fs::write(&file, text.replace("ladder = \"one.st\"", &pairs)).expect("written");
+        let asked = ["change", "old/cluster.toml", "new/cluster.toml"];
+        let text = understudy_in(&folder, &asked).shown();
+        for line in told {
+            assert!(text.lines().any(|it| it == *line), "{line}: {text}");
+        }
+        let json = understudy_in(&folder, &[&asked[..], &["--json"]].concat()).json();
+        let outputs = json["result"]["differences"][0]["outputs"].as_array().expect("outputs");
+        let found: Vec<(&str, &str)> = outputs
+            .iter()
+            .map(|it| {
+                (it["output"].as_str().expect("a name"), it["verdict"].as_str().expect("one"))
+            })
+            .filter(|(name, _)| *name != "program.fault")
+            .collect();
+        assert_eq!(found, verdicts, "{json}");
+    };
+    let from = ", from every state of the old program on";
+    let old = program("", "go : BOOL", "valve, lamp : BOOL;", "valve := go; lamp := NOT go;");
+    let new = program("", "start : BOOL", "tap, lamp : BOOL;", "tap := start; lamp := start;");
+    let pairs = "go = \"start\", valve = \"tap\"";
+    let told = [format!("one: proved equal but for `lamp`{from}")];
+    let verdicts = [("tap", "equal"), ("lamp", "differs")];
+    check([&old, &new], pairs, &told.each_ref().map(String::as_str), &verdicts);
+    // Without the pairs there is nothing in common but the lamp.
+    let told = ["  not compared: `valve` is removed, `tap` is new"];
+    check([&old, &new], "", &told, &[("lamp", "differs")]);
+    let only = program("", "start : BOOL", "tap : BOOL;", "tap := start;");
+    let none = [format!("one: no output is compared{from}")];
+    check([&old, &only], "", &none.each_ref().map(String::as_str), &[]);
+    let modes = |values: &str| {
+        let types = format!("TYPE Mode : ({values}); END_TYPE\n");
+        program(&types, "want : Mode", "is : Mode; on : BOOL;", "is := want; on := want = Auto;")
+    };
+    let told = [
+        "  retyped    input want  Mode (Off 0, Auto 1) to Mode (Auto 0, Off 1), its value is not kept",
+        "  not compared: `is` has another type",
+    ];
+    let both = [modes("Off, Auto"), modes("Auto, Off")];
+    check(both.each_ref().map(String::as_str), "", &told, &[("on", "differs")]);
+}
+
+/// What differs between the files and no change touches is told, also where nothing else differs; and a first signal of another program is refused.
+#[test]
+fn the_plan_tells_what_it_leaves() {
+    let folder = empty_folder("change_left");
+    let program = "PROGRAM one\n VAR_INPUT start : BOOL; END_VAR\n VAR_OUTPUT valve : BOOL; END_VAR\n valve := start;\nEND_PROGRAM\n";
+    write_with(&folder, "old", program, "address = \"127.0.0.1:7700\"");
+    write_with(&folder, "new", program, "address = \"127.0.0.1:7701\"");
+    let other = program.replace(":= start", ":= NOT start");
+    write_with(&folder, "other", &other, "address = \"127.0.0.1:7701\"");
+    let line =
+        "  `address` of remote I/O `one-io` changes from `127.0.0.1:7700` to `127.0.0.1:7701`";
+    for new in ["new", "other"] {
+        let file = format!("{new}/cluster.toml");
+        let answer = understudy_in(&folder, &["change", "old/cluster.toml", &file]);
+        assert_eq!(answer.status, 0, "{}", answer.errors);
+        assert!(answer.output.lines().any(|it| it == line), "{}", answer.output);
+        let nothing = answer.output.contains("there is nothing to change");
+        assert_eq!(nothing, new == "new", "{}", answer.output);
+        let json = understudy_in(&folder, &["change", "old/cluster.toml", &file, "--json"]).json();
+        assert_eq!(json["result"]["later"][0]["setting"], "address", "{json}");
+    }
+    let prepared =
+        understudy_in(&folder, &["change", "old/cluster.toml", "new/cluster.toml", "prepare"]);
+    assert_eq!(prepared.status, 2, "{}", prepared.output);
+    assert!(prepared.errors.contains("`address` of remote I/O"), "{}", prepared.errors);
+}

@@ -80,3 +80,50 @@ fn a_rehearsal_needs_a_run() {
     assert_eq!(answer.status, 2, "{}", answer.shown());
     assert!(answer.errors.contains("U0614"), "{}", answer.shown());
 }
+
+/// The new program has the samples at the places of its own inputs, and an output that only one of the two programs has is not compared.
+#[test]
+fn a_program_with_other_points_is_rehearsed_by_those_that_stay() {
+    let folder = empty_folder("rehearsal_points");
+    let cluster = "[cluster]\nname = \"cell\"\nperiod = \"10ms\"\nsecurity = \"off\"\n[[controller]]\nname = \"one\"\nladder = \"one.st\"\n\
+                   [[remote_io]]\ncontroller = \"one\"\n";
+    let program = |inputs: &str, outputs: &str, body: &str| {
+        format!(
+            "PROGRAM one\nVAR_INPUT {inputs} END_VAR\nVAR_OUTPUT {outputs} END_VAR\nVAR count : INT; END_VAR\ncount := count + 1;\n{body}\nEND_PROGRAM\n"
+        )
+    };
+    let old =
+        program("level : INT := 3;", "shown : INT; sum : INT;", "shown := count; sum := level;");
+    let outputs = "extra : LREAL; sum : INT; shown : INT;";
+    let inputs = "more : REAL; level : INT := 3;";
+    let same = program(inputs, outputs, "extra := 1.0; shown := count; sum := level;");
+    let other = program(inputs, outputs, "extra := 1.0; shown := count + 1; sum := level;");
+    let lone = program(inputs, "extra : LREAL; shown : LREAL;", "extra := 1.0;");
+    for (name, text) in [("old", &old), ("same", &same), ("other", &other), ("lone", &lone)] {
+        fs::create_dir(folder.join(name)).expect("a folder");
+        fs::write(folder.join(name).join("cluster.toml"), cluster).expect("written");
+        fs::write(folder.join(name).join("one.st"), text).expect("written");
+    }
+    let run = ["simulate", "old/cluster.toml", "--cycles", "100", "--seed", "1", "--out", "runs"];
+    let answer = understudy_in(&folder, &run);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    let rehearsed = |new: &str| {
+        let file = format!("{new}/cluster.toml");
+        let answer =
+            understudy_in(&folder, &["change", "runs/latest", &file, "rehearse", "--json"]);
+        let found = answer.json()["result"]["rehearsed"][0].clone();
+        assert!(found["cycles"].as_u64() >= Some(50), "{}", answer.shown());
+        (answer.status, found)
+    };
+    let (exit, found) = rehearsed("same");
+    assert_eq!((exit, &found["differing"]), (0, &Value::from(0)), "{found:#}");
+    assert_eq!(found["compared"], serde_json::json!(["shown", "sum"]), "{found:#}");
+    assert_eq!(found["not_compared"], serde_json::json!(["extra"]), "{found:#}");
+    let told = understudy_in(&folder, &["change", "runs/latest", "same/cluster.toml", "rehearse"]);
+    assert!(told.output.contains("equal in shown, sum\n  not compared: extra"), "{}", told.output);
+    let none = understudy_in(&folder, &["change", "runs/latest", "lone/cluster.toml", "rehearse"]);
+    assert!(none.status == 2 && none.errors.contains("no output of `one`"), "{}", none.shown());
+    let (exit, found) = rehearsed("other");
+    let outputs: Vec<&String> = found["outputs"].as_object().expect("outputs").keys().collect();
+    assert_eq!((exit, &outputs[..]), (1, &[&"shown".to_owned()][..]), "{found:#}");
+}

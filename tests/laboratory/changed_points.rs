@@ -17,7 +17,7 @@ use understudy_wire::{
 };
 
 use super::deaths::{Records, is};
-use super::shared::{DEADLINE, empty_folder, modbus, some_at_a_time};
+use super::shared::{DEADLINE, answer, empty_folder, modbus, some_at_a_time};
 use super::{no_orphan, running_with, signal};
 
 const CLUSTER: &str = r#"
@@ -131,9 +131,12 @@ struct Side {
 }
 
 impl Side {
-    fn write(folder: &Path, program: &str, settings: &str) -> Self {
+    /// `renamed` are keys of the controller, and `settings` those of its remote I/O.
+    fn write(folder: &Path, program: &str, (renamed, settings): (&str, &str)) -> Self {
         fs::create_dir_all(folder).expect("a folder");
-        let text = format!("{CLUSTER}{settings}");
+        let cluster =
+            CLUSTER.replace("\n\n[[remote_io]]", &format!("\n{renamed}\n\n[[remote_io]]"));
+        let text = format!("{cluster}{settings}");
         fs::write(folder.join("drive.st"), program).expect("written");
         let file = folder.join("cluster.toml");
         fs::write(&file, &text).expect("written");
@@ -144,6 +147,11 @@ impl Side {
 
     fn hash(&self) -> ProgramHash {
         self.cluster.controllers()[0].hash
+    }
+
+    /// Width of the outputs in bits.
+    fn width(&self) -> usize {
+        self.cluster.controllers()[0].interface.outputs.width()
     }
 
     /// The value of an output in the words of an image.
@@ -167,12 +175,31 @@ struct Cell {
     records: Records,
 }
 
+impl Drop for Cell {
+    /// Where an assertion fails, the laboratory ends as well.
+    fn drop(&mut self) {
+        if matches!(self.laboratory.try_wait(), Ok(None)) {
+            signal(self.laboratory.id(), Signal::SIGINT);
+            // There is nothing to be done about it.
+            let _ = self.laboratory.wait();
+        }
+    }
+}
+
 impl Cell {
     fn start(name: &str, before: &str, after: &str) -> Self {
+        Self::of(name, (BEFORE, ("", before)), (AFTER, ("", after)))
+    }
+
+    fn of(
+        name: &str,
+        (old, before): (&str, (&str, &str)),
+        (new, after): (&str, (&str, &str)),
+    ) -> Self {
         let out = empty_folder(name);
-        let before = Side::write(&out.join("before"), BEFORE, before);
-        let after = Side::write(&out.join("after"), AFTER, after);
-        let texts = ChangeTexts::with_points(&before.cluster, &after.cluster);
+        let before = Side::write(&out.join("before"), old, before);
+        let after = Side::write(&out.join("after"), new, after);
+        let texts = ChangeTexts::between(&before.cluster, &after.cluster);
         let texts = texts.expect("an online change");
         let runs = out.join("runs");
         let more = ["--cycles", "100000", "--allow-commands"];
@@ -375,4 +402,128 @@ fn points_change_while_a_station_is_dead() {
     assert_eq!(applied["source"], "direct", "{applied}");
     let missed = cell.end();
     assert!(missed.is_empty(), "{missed:?}");
+}
+
+/// The steps of the tool, with what it refuses meanwhile: orders by the old file reach no signal after the switch, and the change is accepted.
+#[test]
+fn the_tool_changes_points() {
+    let _one = some_at_a_time();
+    let mut cell = Cell::start("points_tool", FAIL_SAFE_BEFORE, FAIL_SAFE_AFTER);
+    let run = cell.run.to_str().expect("text").to_owned();
+    let after = cell.after.file.to_str().expect("text").to_owned();
+    let done = |step: &str| {
+        let (exit, document, errors) = answer(&["change", &run, &after, step, "--drop"]);
+        assert_eq!(exit, 0, "{step}: {document:#} {errors}");
+    };
+    let force = |signal: &str| {
+        let (exit, document, _) = answer(&["operate", &run, "--name", "drive-io", "force", signal]);
+        (exit, document["failures"][0]["code"].as_str().map(str::to_owned))
+    };
+    done("prepare");
+    assert_eq!(force("gone=99"), (0, None));
+    done("switch");
+    let changed = |record: &Value| is(record, "drive-io", "points-changed");
+    cell.records.wait_for("the change of the points", changed);
+    let unknown = (2, Some("U0556".to_owned()));
+    assert_eq!(force("gone=98"), unknown);
+    done("cancel");
+    cell.records.wait_for("the change back", changed);
+    assert_eq!(force("gone=97"), (0, None));
+    done("prepare");
+    done("accept");
+    cell.records.wait_for("the change again", changed);
+    let shown = |record: &Value| {
+        let event = &record["event"];
+        is(record, "drive-io", "applied") && event["outputs"]["width"] == cell.after.width()
+    };
+    let applied = cell.records.wait_for("the outputs of the new program", shown);
+    let event = &applied["event"];
+    assert_eq!(cell.after.output(event, "extra"), cell.after.output(event, "shown"), "{applied}");
+    assert_eq!(force("gone=96"), unknown);
+    let missed = cell.end();
+    assert!(missed.is_empty(), "{missed:?}");
+}
+
+/// An operator writes `wanted` and `hand`. The new program has `wanted` under another name, and `hand` from the device.
+const BY_HAND: &str = "
+PROGRAM drive
+  VAR_INPUT wanted : INT; hand : INT; END_VAR
+  VAR_OUTPUT shown : INT; seen : INT; END_VAR
+  shown := wanted;
+  seen := hand;
+END_PROGRAM";
+
+const BY_DEVICE: &str = "
+PROGRAM drive
+  VAR_INPUT more : INT; target : INT; hand : INT; END_VAR
+  VAR_OUTPUT seen : INT; told : INT; END_VAR
+  told := target;
+  seen := hand;
+END_PROGRAM";
+
+/// What an operator has written goes on in an input with another name, and in one that comes from the device now until that is read for the first time: in no
+/// cycle do the outputs see another value. The tool says so.
+#[test]
+fn written_values_go_on_under_other_names_and_from_other_sources() {
+    let _one = some_at_a_time();
+    let (port, log) = device();
+    let setpoint = |name: &str| {
+        format!("inputs.{name} = {{ operator = \"setpoint\", low = 0, high = 99, initial = 5 }}\n")
+    };
+    let field = |places: &str| format!("field = {{ modbus = \"127.0.0.1:{port}\", {places} }}\n");
+    let outputs = |told: &str| {
+        format!("outputs = {{ {told} = \"holding:0 int\", seen = \"holding:1 int\" }}")
+    };
+    let before = format!("{}{}{}", setpoint("wanted"), setpoint("hand"), field(&outputs("shown")));
+    let places = format!("inputs = {{ hand = \"input:3 int\" }}, {}", outputs("told"));
+    let after = format!("{}{}", setpoint("target"), field(&places));
+    let renamed = "renamed = { wanted = \"target\", shown = \"told\" }";
+    let mut cell =
+        Cell::of("points_written", (BY_HAND, ("", &before)), (BY_DEVICE, (renamed, &after)));
+    let run = cell.run.to_str().expect("text").to_owned();
+    let file = cell.after.file.to_str().expect("text").to_owned();
+    for (value, register) in [("wanted=7", 0), ("hand=30", 1)] {
+        let (exit, document, errors) =
+            answer(&["operate", &run, "--name", "drive-io", "write", value]);
+        assert_eq!(exit, 0, "{document:#} {errors}");
+        written(&log, 0, register, if register == 0 { 7 } else { 30 });
+    }
+    let begun = length(&log);
+    for step in ["plan", "prepare", "switch"] {
+        let (exit, document, errors) = answer(&["change", &run, &file, step]);
+        assert_eq!(exit, 0, "{step}: {document:#} {errors}");
+        let points = document["result"]["plan"][0]["points"].as_array().expect("points").clone();
+        let fate = |name: &str| {
+            let mut found = points.iter().filter(|point| point["point"] == name);
+            found.next().map(|point| (point["fate"].clone(), point["before"].clone()))
+        };
+        assert_eq!(fate("target"), Some(("renamed".into(), "wanted".into())), "{document:#}");
+        assert_eq!(fate("told"), Some(("renamed".into(), "shown".into())), "{document:#}");
+    }
+    let changed = |record: &Value| is(record, "drive-io", "points-changed");
+    let changed = cell.records.wait_for("the change of the points", changed);
+    let moment = changed["event"]["moment"].clone();
+    let applied =
+        |record: &Value| is(record, "drive-io", "applied") && record["event"]["moment"] == moment;
+    let applied = cell.records.wait_for("the outputs of that cycle", applied);
+    let value = |name: &str| cell.after.output(&applied["event"], name);
+    assert_eq!((value("told"), value("seen")), (7, 30), "{applied}");
+    written(&log, begun, 1, SENSORS[3]);
+    let middle = length(&log);
+    // Back: the operator's value again, and what the device showed last.
+    let (exit, document, errors) = answer(&["change", &run, &file, "cancel", "--drop"]);
+    assert_eq!(exit, 0, "{document:#} {errors}");
+    cell.records.wait_for("the change back", |record| is(record, "drive-io", "points-changed"));
+    written(&log, middle, 1, SENSORS[3]);
+    let missed = cell.end();
+    assert!(missed.is_empty(), "{missed:?}");
+    let log = log.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let of = |register| {
+        let mut values = of_register(&log[begun..], register);
+        values.dedup();
+        values
+    };
+    // At the end of the laboratory the fail-safe values.
+    assert!(matches!(of(0)[..], [7] | [7, 0]), "{:?}", of(0));
+    assert!(matches!(of(1)[..], [30, 44] | [30, 44, 0]), "{:?}", of(1));
 }

@@ -45,7 +45,7 @@ fn changed_run(folder: &Path) -> PathBuf {
     let mut journal = Journal::create(&run.join("journal.jsonl"), 1_000_000).expect("created");
     let members = Members::of(&clusters[0]);
     let moment = |cycle| Moment { epoch: Epoch(1), cycle: Cycle(cycle) };
-    let texts = ChangeTexts::with_points(&clusters[0], &clusters[1]).expect("an online change");
+    let texts = ChangeTexts::between(&clusters[0], &clusters[1]).expect("an online change");
     journal.write(&Record::of_run(0, RunEvent::ChangeLoaded { texts: Box::new(texts) }));
     for cycle in 0..END {
         let version = usize::from(cycle >= SWITCH);

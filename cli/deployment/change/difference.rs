@@ -5,7 +5,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
 use understudy_bits::{Switch, System};
-use understudy_cluster::{ChangeTexts, Cluster, Code, nearest_of, origins, states_at_change};
+use understudy_cluster::{
+    ChangeTexts, ChangedPoint, Cluster, CommonPoints, Controller, PointFate, changed_points,
+    nearest_of, origins, states_at_change,
+};
 use understudy_typed::Program;
 use understudy_verification::numbers::{Answer, Difference, Run};
 use understudy_verification::program::Bounds;
@@ -19,6 +22,9 @@ const NEWEST: Kept = Kept { cycles: 256, events: 1, changes: 1, timings: 1 };
 /// Number of outputs whose runs are printed for each program.
 const SHOWN: usize = 5;
 
+/// Number of outputs that a line names.
+const MOST_NAMES: usize = 12;
+
 /// The differences of all programs that change.
 pub(super) struct Differences(Vec<OfProgram>);
 
@@ -29,6 +35,8 @@ struct OfProgram {
     /// Why the change is not before the newest state of the run that was named.
     no_state: Option<String>,
     outcome: Result<Vec<OfOutput>, String>,
+    /// Outputs that the two programs do not have in common.
+    lone: Vec<ChangedPoint>,
 }
 
 struct OfOutput {
@@ -59,8 +67,7 @@ pub(super) fn newest_states(run: &understudy_view::Run) -> Option<Model> {
 impl Differences {
     /// Of all programs that change; `live` are the states that they are in. What is not decided within `budget` stays undecided.
     pub(super) fn of(
-        before: &Cluster,
-        after: &Cluster,
+        (before, after): (&Cluster, &Cluster),
         texts: &ChangeTexts,
         live: Option<&Model>,
         budget: Duration,
@@ -82,10 +89,14 @@ impl Differences {
                 after: state.as_ref().map(|(cycle, _)| *cycle),
                 no_state,
                 outcome: outcome(
-                    (&old.code, &new.code),
+                    (old, new),
                     state.as_ref().map(|(_, state)| state.as_slice()),
                     bounds,
                 ),
+                lone: changed_points(before, after, changed.program)
+                    .into_iter()
+                    .filter(ChangedPoint::is_lone_output)
+                    .collect(),
             }
         });
         Self(programs.collect())
@@ -105,10 +116,12 @@ impl Differences {
 }
 
 fn outcome(
-    (old, new): (&Code, &Code),
+    controllers: (&Controller, &Controller),
     state: Option<&[u64]>,
     bounds: Bounds<'_>,
 ) -> Result<Vec<OfOutput>, String> {
+    let (old, new) = (&controllers.0.code, &controllers.1.code);
+    let same = CommonPoints::of(controllers.0, controllers.1).names();
     let (states, taken);
     let switch = match state {
         Some(state) => {
@@ -126,7 +139,7 @@ fn outcome(
             Switch::AnyScan { origins: &taken }
         }
     };
-    let difference = Difference::between(old.typed(), new.typed(), switch);
+    let difference = Difference::between(old.typed(), new.typed(), switch, &same);
     let difference = difference.map_err(|error| error.to_string())?;
     let any_values = difference.any_values().iter().map(ToString::to_string);
     let any_values: Vec<String> = any_values.collect();
@@ -179,6 +192,15 @@ impl Shown {
     }
 }
 
+/// A list of names, of which the first ones are written.
+fn some_of(names: &[String]) -> String {
+    let told = names.iter().take(MOST_NAMES).cloned().collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(MOST_NAMES) {
+        0 => told,
+        more => format!("{told} and {more} more"),
+    }
+}
+
 impl OfProgram {
     fn text(&self) -> String {
         let mut text = String::new();
@@ -206,17 +228,34 @@ impl OfProgram {
         };
         let differs = of(|verdict| matches!(verdict, Verdict::Differs(_)));
         let undecided = of(|verdict| matches!(verdict, Verdict::Undecided(_)));
+        let mut equal = of(|verdict| matches!(verdict, Verdict::Equal));
         // Whether a program is stopped by a fault is no output of the plant.
-        let is_equal = outputs.iter().any(|output| {
-            matches!(output.verdict, Verdict::Equal) && output.name != Program::FAULT
-        });
+        equal.retain(|name| name.trim_matches('`') != Program::FAULT);
         let but = [differs, undecided].concat();
-        let told = match (!is_equal, but.is_empty()) {
-            (_, true) => "proved equal in all outputs".to_owned(),
-            (false, false) => format!("proved equal but for {}", but.join(", ")),
+        let told = match (equal.is_empty(), but.is_empty()) {
+            (true, true) if !self.lone.is_empty() => "no output is compared".to_owned(),
+            (_, true) if self.lone.is_empty() => "proved equal in all outputs".to_owned(),
+            (_, true) => format!("proved equal in {}", some_of(&equal)),
+            (false, false) if self.lone.is_empty() => {
+                format!("proved equal but for {}", but.join(", "))
+            }
+            (false, false) => {
+                format!("proved equal in {}, not in {}", some_of(&equal), but.join(", "))
+            }
             (true, false) => format!("not proved equal in any output: {}", but.join(", ")),
         };
         let _ = writeln!(text, "{}: {told}, {from}", self.program);
+        if !self.lone.is_empty() {
+            let lone = self.lone.iter().map(|point| {
+                let why = match point.fate {
+                    PointFate::New(..) => "is new",
+                    PointFate::Removed(..) => "is removed",
+                    _ => "has another type",
+                };
+                format!("`{}` {why}", point.name)
+            });
+            let _ = writeln!(text, "  not compared: {}", some_of(&lone.collect::<Vec<_>>()));
+        }
         let mut left = SHOWN;
         for OfOutput { name, verdict } in outputs {
             match verdict {
@@ -263,6 +302,7 @@ impl OfProgram {
             "after_cycle": self.after,
             "state_unknown": self.no_state,
             "outputs": outputs.collect::<Vec<_>>(),
+            "not_compared": self.lone.iter().map(|point| &point.name).collect::<Vec<_>>(),
             "reason": self.outcome.as_ref().err(),
         })
     }

@@ -4,20 +4,22 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use understudy_cluster::{
-    ChangeTexts, ChangedInitial, ChangedSetting, Cluster, changed_fallbacks, changed_initials,
-    done_pairs, fates,
+    ChangeTexts, ChangedInitial, ChangedPoint, ChangedSetting, Cluster, CommonPoints, PointFate,
+    changed_fallbacks, changed_initials, changed_points, done_pairs, fates, later_settings,
 };
 use understudy_typed::{CarriedPath, Fate, Renamed};
 
 use super::difference::Differences;
 use crate::answer::{Answer, Status};
 
-pub(super) const NOTHING: &str = "the programs and the fail-safe settings of the two files are equal: there is nothing to change";
+const NOTHING: &str = "the programs and the fail-safe settings of the two files are equal: there is nothing to change";
 
 /// What would change.
 pub(super) struct Plan {
     programs: Vec<PlannedProgram>,
     settings: Vec<ChangedSetting>,
+    /// What differs and is not changed.
+    later: Vec<ChangedSetting>,
 }
 
 /// What would become of the variables of one program.
@@ -25,8 +27,12 @@ struct PlannedProgram {
     name: String,
     paths: Vec<CarriedPath>,
     initials: Vec<ChangedInitial>,
+    /// Inputs and outputs that change.
+    points: Vec<ChangedPoint>,
     /// Pairs that rename nothing any more.
     done: Vec<Renamed>,
+    /// Alarms of the cluster before whose points are gone.
+    ended_alarms: Vec<String>,
 }
 
 impl Plan {
@@ -36,10 +42,28 @@ impl Plan {
             let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
             let paths = fates(&old.code, &new.code);
             let initials = changed_initials(&old.code, &new.code, &paths);
+            let points = changed_points(before, after, changed.program);
             let done = done_pairs(&old.code, &new.code);
-            PlannedProgram { name: new.name.clone(), paths, initials, done }
+            let common = CommonPoints::of(old, new);
+            let ended_alarms = before.alarms().iter().filter(|alarm| {
+                let stay = if alarm.is_output { &common.outputs } else { &common.inputs };
+                alarm.program == changed.program
+                    && stay.iter().all(|[was, _]| was.name != alarm.point.name)
+            });
+            let ended_alarms = ended_alarms.map(|alarm| alarm.name.clone()).collect();
+            let name = new.name.clone();
+            PlannedProgram { name, paths, initials, points, done, ended_alarms }
         });
-        Self { programs: programs.collect(), settings: changed_fallbacks(before, after, texts) }
+        Self {
+            programs: programs.collect(),
+            settings: changed_fallbacks(before, after, texts),
+            later: later_settings(before, after),
+        }
+    }
+
+    /// That nothing changes while the cluster runs, with what differs all the same.
+    pub(super) fn nothing(&self) -> String {
+        parts([NOTHING.to_owned(), self.later_text()])
     }
 
     /// The way back, without the variables that only the new program has.
@@ -67,7 +91,7 @@ impl Plan {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        for PlannedProgram { name, paths, initials, done } in &self.programs {
+        for PlannedProgram { name, paths, initials, points, done, ended_alarms } in &self.programs {
             let count = |fate| paths.iter().filter(|path| path.fate == fate).count();
             let _ = writeln!(
                 text,
@@ -100,6 +124,15 @@ impl Plan {
                     initial.path
                 );
             }
+            for point in points {
+                let _ = writeln!(text, "  {:<9}  {point}", point.fate.word());
+            }
+            for alarm in ended_alarms {
+                let _ = writeln!(
+                    text,
+                    "  alarm {alarm}: its point is gone with the switch, so it is over, and does not come again"
+                );
+            }
             for (before, now) in done {
                 let _ = writeln!(
                     text,
@@ -111,67 +144,109 @@ impl Plan {
     }
 
     fn settings_text(&self) -> String {
-        if self.settings.is_empty() {
-            return String::new();
-        }
-        let settings: String =
-            self.settings.iter().map(|setting| format!("\n  {setting}")).collect();
-        format!("From `accept` on, and no sooner:{settings}")
+        listed("From `accept` on, and no sooner:", &self.settings)
     }
 
-    fn settings_json(&self) -> Value {
-        let bare = |text: &str| text.replace('`', "");
-        let settings = self.settings.iter().map(|setting| match setting {
-            ChangedSetting::Key { of, key, values } => {
-                let [before, now] = match values {
-                    Some([before, now]) => [Some(bare(before)), Some(bare(now))],
-                    None => [None, None],
-                };
-                json!({ "of": bare(of), "setting": bare(key), "before": before, "now": now })
-            }
-            ChangedSetting::Section { of, .. } => json!({ "of": bare(of) }),
-        });
-        settings.collect()
+    fn later_text(&self) -> String {
+        let title = "Not changed now; from the next start of a member or a view with the new file on, and no sooner:";
+        listed(title, &self.later)
     }
 
     pub(super) fn json(&self) -> Value {
-        let programs =
-            self.programs.iter().map(|PlannedProgram { name, paths, initials, done }| {
-                let paths = paths.iter().map(|path| {
-                    json!({
-                        "path": path.path,
-                        "fate": path.fate.name(),
-                        "renamed_from": path.renamed_from,
-                        "before": path.before,
-                        "now": path.now,
-                    })
-                });
-                let initials = initials.iter().map(|initial| {
-                    let [before, now] = match &initial.values {
-                        Some([one, other]) => [Some(one), Some(other)],
-                        None => [None, None],
-                    };
-                    json!({ "path": initial.path, "before": before, "now": now })
-                });
+        let programs = self.programs.iter().map(|planned| {
+            let PlannedProgram { name, paths, initials, points, done, ended_alarms } = planned;
+            let paths = paths.iter().map(|path| {
                 json!({
-                    "program": name,
-                    "paths": paths.collect::<Vec<_>>(),
-                    "initial_values": initials.collect::<Vec<_>>(),
-                    "renamed_before": done.iter().map(|(_, now)| now).collect::<Vec<_>>(),
+                    "path": path.path,
+                    "fate": path.fate.name(),
+                    "renamed_from": path.renamed_from,
+                    "before": path.before,
+                    "now": path.now,
                 })
             });
+            let initials = initials.iter().map(|initial| {
+                let [before, now] = match &initial.values {
+                    Some([one, other]) => [Some(one), Some(other)],
+                    None => [None, None],
+                };
+                json!({ "path": initial.path, "before": before, "now": now })
+            });
+            json!({
+                "program": name,
+                "paths": paths.collect::<Vec<_>>(),
+                "points": points.iter().map(point_json).collect::<Vec<_>>(),
+                "initial_values": initials.collect::<Vec<_>>(),
+                "renamed_before": done.iter().map(|(_, now)| now).collect::<Vec<_>>(),
+                "ended_alarms": ended_alarms,
+            })
+        });
         Value::Array(programs.collect())
     }
 
     pub(super) fn answer(&self, differences: &Differences) -> Answer {
-        let parts = [self.text(), self.settings_text(), differences.text()];
-        let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-        let text = if parts.is_empty() { NOTHING.to_owned() } else { parts.join("\n\n") };
+        let changes = [self.text(), self.settings_text()];
+        let text = match changes.iter().all(String::is_empty) {
+            true => self.nothing(),
+            false => {
+                let [programs, settings] = changes;
+                parts([programs, settings, self.later_text(), differences.text()])
+            }
+        };
         let result = json!({
             "plan": self.json(),
-            "settings": self.settings_json(),
+            "settings": settings_json(&self.settings),
+            "later": settings_json(&self.later),
             "differences": differences.json(),
         });
         Answer::done(text, result)
     }
+}
+
+/// Parts of a text, without those that say nothing.
+fn parts<const N: usize>(parts: [String; N]) -> String {
+    let parts = parts.into_iter().filter(|part| !part.is_empty());
+    parts.collect::<Vec<_>>().join("\n\n")
+}
+
+fn listed(title: &str, settings: &[ChangedSetting]) -> String {
+    if settings.is_empty() {
+        return String::new();
+    }
+    let settings: String = settings.iter().map(|setting| format!("\n  {setting}")).collect();
+    format!("{title}{settings}")
+}
+
+fn settings_json(settings: &[ChangedSetting]) -> Value {
+    let bare = |text: &str| text.replace('`', "");
+    let settings = settings.iter().map(|setting| match setting {
+        ChangedSetting::Key { of, key, values } => {
+            let [before, now] = match values {
+                Some([before, now]) => [Some(bare(before)), Some(bare(now))],
+                None => [None, None],
+            };
+            json!({ "of": bare(of), "setting": bare(key), "before": before, "now": now })
+        }
+        ChangedSetting::Section { of, is_new } => json!({ "of": bare(of), "is_new": is_new }),
+    });
+    settings.collect()
+}
+
+fn point_json(ChangedPoint { name, is_output, fate }: &ChangedPoint) -> Value {
+    let [before, now, fail_safe] = match fate.clone() {
+        PointFate::New(of, value) => [None, Some(of), value],
+        PointFate::Removed(of, value) => [Some(of), None, value],
+        PointFate::Renamed(name) => [Some(name), None, None],
+        PointFate::Retyped([before, now], value) => [Some(before), Some(now), value],
+        PointFate::Redeclared([before, now])
+        | PointFate::Moved([before, now])
+        | PointFate::Sourced([before, now]) => [Some(before), Some(now), None],
+    };
+    json!({
+        "point": name,
+        "side": if *is_output { "output" } else { "input" },
+        "fate": fate.word(),
+        "before": before,
+        "now": now,
+        "fail_safe": fail_safe.map(|value| value.replace('`', "")),
+    })
 }

@@ -1,6 +1,6 @@
 //! `understudy change … rehearse`: what the new programs would have done in a run.
 
-use understudy_cluster::{ChangeTexts, Cluster};
+use understudy_cluster::{ChangeTexts, Cluster, changed_points};
 use understudy_view::{Bounds, Following, Model, Rehearsal, Run};
 
 use super::{Arguments, pause};
@@ -13,7 +13,7 @@ const MORE: usize = 64;
 pub(super) fn rehearse(
     arguments: &Arguments,
     run: Option<&Run>,
-    before: &Cluster,
+    (before, after): (&Cluster, &Cluster),
     texts: &ChangeTexts,
 ) -> Result<Answer, Answer> {
     let Some(run) = run else {
@@ -27,7 +27,10 @@ pub(super) fn rehearse(
         let controller = &before.controllers()[changed.program.index()];
         let points = (controller.interface.inputs.clone(), controller.interface.outputs.clone());
         let program = changed.program;
-        (program, Rehearsal::new(&controller.name, changed, points, arguments.renew))
+        let points_of = changed_points(before, after, program);
+        let lone = points_of.iter().filter(|point| point.is_lone_output());
+        let lone = lone.map(|point| point.name.clone()).collect();
+        (program, Rehearsal::new(&controller.name, changed, (points, lone), arguments.renew))
     });
     let mut rehearsals: Vec<_> = rehearsals.collect();
     let cycles = usize::try_from(arguments.cycles).unwrap_or(usize::MAX);
@@ -62,6 +65,13 @@ pub(super) fn rehearse(
     if found.iter().any(|found| found.cycles == 0) {
         let message = "the run has no cycle in which the state of a program that changes is known";
         return Err(Answer::failed(Status::BadInput, "U0614", message.to_owned()));
+    }
+    if let Some(of) = found.iter().find(|found| found.compared.is_empty()) {
+        let message = format!(
+            "no output of `{}` is compared: the old program and the new one have none in common",
+            of.program
+        );
+        return Err(Answer::failed(Status::BadInput, "U0614", message));
     }
     let answer = Answer::done(text.trim_end(), serde_json::json!({ "rehearsed": found }));
     Ok(answer.with_status(if is_equal { Status::Done } else { Status::Failed }))

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 
-use understudy_bits::Switch;
+use understudy_bits::{SameNames, Switch};
 use understudy_structured_text::{Options, lower, parser};
 use understudy_typed::{Interpreter, Program, Successor, Told};
 use understudy_verification::numbers::{Answer, Difference, Run};
@@ -312,7 +312,8 @@ fn compare(told: &str, pair: &Pair, start: Option<&[u64]>, counts: &mut Counts) 
         (Some(before), Some(after)) => Switch::Now { before, after },
         _ => Switch::AnyScan { origins: &origins },
     };
-    let difference = Difference::between(&pair.old, &pair.new, switch);
+    let same = SameNames::by_name(&pair.old, &pair.new);
+    let difference = Difference::between(&pair.old, &pair.new, switch, &same);
     let difference = difference.unwrap_or_else(|error| panic!("{told}\n{error}"));
     let is_exact = difference.inexact().is_none();
     assert!(is_exact || start.is_none(), "{told}");

@@ -221,7 +221,7 @@ mod tests {
             let read = understudy_cluster::read("c.toml", FILE, &mut |_| Ok(program.to_owned()));
             read.cluster.expect("a cluster")
         });
-        let texts = ChangeTexts::with_points(&clusters[0], &clusters[1]).expect("a change");
+        let texts = ChangeTexts::between(&clusters[0], &clusters[1]).expect("a change");
         let hashes = [0, 1].map(|side: usize| clusters[side].controllers()[0].hash);
         let members = Members::of(&clusters[0]);
         let moment = |cycle| Moment { epoch: Epoch(1), cycle: Cycle(cycle) };

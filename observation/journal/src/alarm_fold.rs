@@ -7,16 +7,21 @@
 //! Each is true, false or unknown. Invariant: the evaluation depends on the records and their cycles only, and an evaluation that starts in the
 //! middle of a journal is unknown until it equals that of the whole journal.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use understudy_bus::HostEvent;
-use understudy_cluster::{AlarmDeclaration, Controller, same_point};
+use understudy_cluster::{AlarmDeclaration, CommonPoints, same_point};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_typed::Point;
-use understudy_wire::{Image, Member, Part, ProgramId};
+use understudy_wire::{Image, Member, Part, ProgramHash, ProgramId};
 
+use crate::present::Present;
 use crate::record::{Happening, Record, RunEvent};
 use crate::rules::Process;
+
+/// Versions of programs of which it is known what the points of alarms are in them, at most.
+const MOST_VERSIONS: usize = 64;
 
 /// Condition of an alarm up to a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,14 +75,18 @@ struct Track {
     is_unnamed: bool,
     /// Of two remote I/Os of a program: the author, where that is known.
     author: Option<Member>,
+    /// The version of the program whose points counted last, where another one than the first did.
+    version: Option<ProgramHash>,
 }
 
 /// The alarms of a cluster, evaluated record by record.
 #[derive(Debug, Clone)]
 pub struct AlarmFold {
     alarms: Arc<[AlarmDeclaration]>,
-    /// Of each, the point in the version of its program whose points count; nothing where that has none of its name and type.
+    /// Of each, the point in the version of its program whose points count; nothing where that does not have it.
     points: Vec<Option<Point>>,
+    /// The same for the versions whose points have counted: what was renamed step by step is found again after a restart, which begins with the first one.
+    found: BTreeMap<(ProgramId, ProgramHash), Vec<Option<Point>>>,
     conditions: Vec<Condition>,
     /// Whether each was raised and is not known to be over.
     lasting: Vec<bool>,
@@ -115,32 +124,55 @@ impl AlarmFold {
             lasting: vec![false; alarms.len()],
             tracks: vec![Track::default(); programs],
             points: alarms.iter().map(|alarm| Some(alarm.point.clone())).collect(),
+            found: BTreeMap::new(),
             alarms,
         }
     }
 
-    /// Other points of a program count from now on; nothing of them is known where the version is not. An alarm goes on with the point of the same name and
-    /// type, and ends where there is none.
-    pub fn lay_out(
-        &mut self,
-        program: ProgramId,
-        version: Option<&Controller>,
-    ) -> Vec<AlarmChange> {
-        if let Some(track) = self.tracks.get_mut(program.index()) {
-            // By the points of before.
-            track.inputs = None;
-            track.is_unnamed = version.is_none();
-        }
+    /// Other points of a program count from now on; nothing of them is known where the version is not. An alarm goes on with the point that its point has
+    /// become, by name or by a declared pair, and of the same type, and ends where there is none.
+    pub fn lay_out(&mut self, program: ProgramId, present: &Present) -> Vec<AlarmChange> {
+        let version = present.controller(program);
+        let Some(track) = self.tracks.get_mut(program.index()) else {
+            return Vec::new();
+        };
+        // By the points of before.
+        track.inputs = None;
+        track.is_unnamed = version.is_none();
         let Some(version) = version else {
             return self.forget(program);
         };
-        let (inputs, outputs) = (&version.interface.inputs, &version.interface.outputs);
-        for (alarm, point) in self.alarms.iter().zip(&mut self.points) {
+        let before = track.version.replace(version.hash);
+        let first = present.first().controllers().get(program.index()).map(|first| first.hash);
+        if self.found.len() >= MOST_VERSIONS {
+            self.found.clear();
+        }
+        if let Some(first) = first {
+            let points = || self.alarms.iter().map(|alarm| Some(alarm.point.clone())).collect();
+            self.found.entry((program, first)).or_insert_with(points);
+        }
+        let before = before.or(first).and_then(|before| present.controller_of(program, before));
+        let common = before.map(|before| CommonPoints::of(before, version)).unwrap_or_default();
+        let known = self.found.get(&(program, version.hash));
+        let follow = |(place, alarm): (usize, &AlarmDeclaration)| {
+            let (common, points) = match alarm.is_output {
+                true => (&common.outputs, &version.interface.outputs),
+                false => (&common.inputs, &version.interface.inputs),
+            };
+            let known = known.and_then(|known| known[place].clone());
+            let followed = self.points[place].as_ref().and_then(|point| {
+                let found = common.iter().find(|[was, _]| was.name == point.name);
+                found.map(|[_, is]| is.clone())
+            });
+            known.or(followed).or_else(|| same_point(&alarm.point, points).cloned())
+        };
+        let points: Vec<Option<Point>> = self.alarms.iter().enumerate().map(follow).collect();
+        for (place, alarm) in self.alarms.iter().enumerate() {
             if alarm.program == program {
-                let points = if alarm.is_output { outputs } else { inputs };
-                *point = same_point(&alarm.point, points).cloned();
+                self.points[place].clone_from(&points[place]);
             }
         }
+        self.found.insert((program, version.hash), points);
         self.change(program, |_, point, condition| {
             if point.is_none() {
                 *condition = Condition::OVER;

@@ -117,6 +117,33 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
 /// # Errors
 /// [`KeptError`].
 pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
+    read_kept_cluster(run, true)
+}
+
+/// What the command line of a run said in place of the cluster file that was kept with it.
+///
+/// # Errors
+/// [`KeptError`].
+pub fn kept_overrides(run: &Path) -> Result<Overrides, KeptError> {
+    let [used, written] = [read_kept_cluster(run, true)?, read_kept_cluster(run, false)?];
+    fn said<T: PartialEq>(
+        of: impl Fn(&Cluster) -> T,
+        used: &Cluster,
+        written: &Cluster,
+    ) -> Option<T> {
+        Some(of(used)).filter(|value| *value != of(written))
+    }
+    Ok(Overrides {
+        period: said(|it| it.agreement().schedule.period(), &used, &written),
+        link: said(Cluster::link, &used, &written),
+        security: said(Cluster::security, &used, &written),
+        mode: said(|it| it.agreement().mode, &used, &written),
+        turns: said(|it| it.agreement().schedule.turns(), &used, &written),
+    })
+}
+
+/// The cluster that was kept with a run, as the run used it or as its file has it.
+fn read_kept_cluster(run: &Path, is_as_used: bool) -> Result<Cluster, KeptError> {
     let folder = run.join(FOLDER);
     let file = folder.join(CLUSTER_FILE);
     if !file.is_file() {
@@ -137,13 +164,14 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Kept::default(),
         Err(error) => return Err(unreadable(kept_file, error.to_string())),
     };
-    let overrides = Overrides {
+    let used = Overrides {
         period: kept.period_ns.map(Duration::from_nanos),
         link: kept.link,
         security: kept.security,
         mode: kept.mode,
         turns: kept.turns,
     };
+    let overrides = if is_as_used { used } else { Overrides::default() };
     let name = file.display().to_string();
     let loaded = read_with(&name, &cluster, overrides, &mut |name| {
         let file = kept.ladders.get(name).map_or(name, String::as_str);
@@ -219,6 +247,9 @@ mod tests {
         assert_eq!(kept.agreement().mode, Mode::Paper);
         assert_eq!((kept.link(), kept.security()), (Link::Udp, Security::Off));
         assert_eq!(kept.agreement().configuration, cluster.agreement().configuration);
+        // What the file says too was not said by the command line.
+        let said = Overrides { link: None, ..overrides };
+        assert_eq!(kept_overrides(&run).expect("it has no errors"), said);
         fs::write(run.join("cluster/robot.ladder"), "rung oh").expect("written");
         assert!(matches!(kept_cluster(&run), Err(KeptError::Files { .. })));
     }

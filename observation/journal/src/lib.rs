@@ -36,7 +36,7 @@ pub use continuation::{Continuation, ProgramSoFar};
 pub use cycles::Cycles;
 pub use in_effect::records_not_over;
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
-pub use kept::{KeptError, keep_cluster, kept_cluster};
+pub use kept::{KeptError, keep_cluster, kept_cluster, kept_overrides};
 pub use members::{Members, NamedInput, NamedSignal};
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use numbering::Numbering;

@@ -223,7 +223,7 @@ impl Listing {
         self.stops.turned(&turn, &self.present);
         match turn {
             Turn::Loaded(_) => Vec::new(),
-            Turn::Points(program) => self.alarms.lay_out(program, self.present.controller(program)),
+            Turn::Points(program) => self.alarms.lay_out(program, &self.present),
         }
     }
 

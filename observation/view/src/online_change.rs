@@ -18,6 +18,8 @@ pub(crate) struct ChangeStanding {
     configurations: BTreeMap<Member, Option<Configurations>>,
     loaded: Option<LoadedChange>,
     given: Option<GivenStep>,
+    /// The change of the newest step that names it.
+    named: Option<ChangeName>,
 }
 
 /// The change whose texts members were given last.
@@ -129,6 +131,12 @@ impl ChangeStanding {
             ChangeReport::Loaded(loaded) => self.loaded = Some(loaded.clone()),
             ChangeReport::Given { by, request } => {
                 let step = self.step(request);
+                self.named = match request {
+                    ChangeRequest::Prepare { .. } => self.named,
+                    ChangeRequest::Switch { change, .. }
+                    | ChangeRequest::Run { change, .. }
+                    | ChangeRequest::Forget { change, .. } => Some(*change),
+                };
                 // Each member is asked.
                 let is_known =
                     self.given.as_ref().is_some_and(|given| given.by == *by && given.step == step);
@@ -195,13 +203,11 @@ impl Model {
             Some([own, prepared?])
         })?;
         let loaded = known.loaded.as_ref();
-        let loaded = loaded.filter(|loaded| two.iter().all(|it| loaded.name.has(*it)));
-        let first = self.cluster().agreement().configuration;
-        let [before, after] = match loaded {
-            Some(loaded) => [loaded.name.before, loaded.name.after],
-            None if two[1] == first => [two[1], two[0]],
-            None => two,
-        };
+        let is_it = |name: &ChangeName| two.iter().all(|it| name.has(*it));
+        let loaded = loaded.filter(|loaded| is_it(&loaded.name));
+        let named = loaded.map(|loaded| loaded.name).or(known.named.filter(is_it));
+        // Who began to read within the change does not know which one was before: as long as it is not accepted, that is the members' own.
+        let [before, after] = named.map_or(two, |name| [name.before, name.after]);
         let place = |member| match of(member) {
             None => ChangePlace::NotLoaded,
             Some(None) => ChangePlace::NotKnown,

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_cycle::ProgramChange;
-use understudy_executable::Scratch;
+use understudy_cycle::{PointPlace, ProgramChange};
+use understudy_executable::{Scratch, declared};
 use understudy_typed::{Point, Points};
 use understudy_wire::{Image, Lineage};
 
@@ -53,6 +53,10 @@ pub struct Rehearsed {
     pub first: Option<FirstDifference>,
     /// The outputs that differ, by name.
     pub outputs: BTreeMap<String, OutputDifference>,
+    /// The outputs that are compared: those that both programs have, by the names of the old one.
+    pub compared: Vec<String>,
+    /// The outputs that only one of the two programs has, or that have another type.
+    pub not_compared: Vec<String>,
 }
 
 /// The first cycle in which an output differs.
@@ -80,13 +84,21 @@ pub struct OutputDifference {
 }
 
 impl Rehearsal {
-    /// Of a program that an online change replaces; it takes the state of the old program over every `renew_after` scans.
+    /// Of a program that an online change replaces; it takes the state of the old program over every `renew_after` scans. The points are those of the old
+    /// program; `not_compared` are the outputs that the two programs do not have in common.
     pub fn new(
         name: &str,
         change: ProgramChange,
-        (inputs, outputs): (Points, Points),
+        ((inputs, outputs), not_compared): ((Points, Points), Vec<String>),
         renew_after: u32,
     ) -> Self {
+        let points = change.points.as_deref();
+        let is_common = |output: &&Point| {
+            let place = PointPlace::of(output);
+            points.is_none_or(|points| points.forward().output(place).is_some())
+        };
+        let compared = declared(&outputs).filter(is_common).map(|output| output.name.clone());
+        let compared = compared.collect();
         Self {
             change,
             inputs,
@@ -95,7 +107,12 @@ impl Rehearsal {
             scratch: Scratch::default(),
             running: None,
             newest: None,
-            found: Rehearsed { program: name.to_owned(), ..Rehearsed::default() },
+            found: Rehearsed {
+                program: name.to_owned(),
+                compared,
+                not_compared,
+                ..Rehearsed::default()
+            },
         }
     }
 
@@ -136,12 +153,20 @@ impl Rehearsal {
         self.running = Some(running);
     }
 
-    /// The outputs of the new program from a state of its own.
+    /// The outputs of the new program from a state of its own, at the places of the old one; an input that only the new one has keeps its initial value.
     fn step(&mut self, state: &mut [u64], sampled: &Sampled) -> Image {
-        let mut outputs = Image::zero(sampled.outputs.width());
+        let points = self.change.points.as_deref();
+        let inputs =
+            points.map(|points| points.forward().inputs(&sampled.inputs, &points.after.initial()));
+        let inputs = inputs.as_ref().unwrap_or(&sampled.inputs);
         let executable = &self.change.after.executable;
-        executable.step(&mut self.scratch, state, sampled.inputs.words(), outputs.words_mut());
-        outputs
+        let mut outputs = Image::zero(executable.output_count());
+        executable.step(&mut self.scratch, state, inputs.words(), outputs.words_mut());
+        // An output that only one of the two programs has is not compared.
+        match points {
+            Some(points) => points.back().outputs(&outputs, &sampled.outputs),
+            None => outputs,
+        }
     }
 
     fn compare(&mut self, cycle: i64, scans: u32, sampled: &Sampled, outputs: &Image) {
@@ -184,11 +209,20 @@ impl Rehearsed {
     /// For a terminal.
     pub fn to_text(&self) -> String {
         let Self { program, cycles, differing, .. } = self;
+        let others = match &self.not_compared[..] {
+            [] => String::new(),
+            names => format!("  not compared: {}\n", names.join(", ")),
+        };
         let Some(first) = &self.first else {
-            return format!("{program}: {cycles} cycles rehearsed, all outputs are equal\n");
+            let equal = match (&self.compared[..], &self.not_compared[..]) {
+                (_, []) => "all outputs are equal".to_owned(),
+                ([], _) => "no output is compared".to_owned(),
+                (names, _) => format!("equal in {}", names.join(", ")),
+            };
+            return format!("{program}: {cycles} cycles rehearsed, {equal}\n{others}");
         };
         let mut text = format!(
-            "{program}: {cycles} cycles rehearsed, other outputs in {differing}\n  first in cycle {}, {} scans after the new program took the state over\n    old: {}\n    new: {}\n    inputs: {}\n",
+            "{program}: {cycles} cycles rehearsed, other outputs in {differing}\n{others}  first in cycle {}, {} scans after the new program took the state over\n    old: {}\n    new: {}\n    inputs: {}\n",
             first.cycle, first.scans, first.before, first.now, first.inputs
         );
         for (name, OutputDifference { cycles, at_once }) in &self.outputs {

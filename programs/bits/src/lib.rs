@@ -28,6 +28,6 @@ pub use circuit::{Derivation, Meaning};
 pub use exact::{Compared, Exact, Gap, Inexact, Shown, exact};
 pub use execute::Unsupported;
 pub use layout::{Layout, Registers};
-pub use program::{AnyValue, InTheWay, Member, POWER_RETURNS, Switch};
+pub use program::{AnyValue, InTheWay, Member, POWER_RETURNS, SameNames, Switch};
 pub use system::{Cell, Input, Source, System};
 pub use term::{Node, Term, Terms, Variable};

@@ -21,7 +21,7 @@ use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
 use crate::system::{Holds, Source, System};
 use crate::term::Term;
-pub use change::{AnyValue, InTheWay, Switch};
+pub use change::{AnyValue, InTheWay, SameNames, Switch};
 use moments::Age;
 pub use restart::POWER_RETURNS;
 use restart::Restart;

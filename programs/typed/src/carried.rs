@@ -157,8 +157,8 @@ struct Names<'n> {
 }
 
 impl Points {
-    /// Puts the values of points before into an image of these, by name and type: of those in `names`, and not where the type or the subrange of the
-    /// point does not have the value. Answers with those of `names` whose values are in no point.
+    /// Puts the values of points before into an image of these, by name and type: of those in `names`, each with its name before and now, and not where
+    /// the type or the subrange of the point does not have the value. Answers with the names before of those whose values are in no point.
     ///
     /// # Panics
     /// If an image is narrower than its points.
@@ -166,11 +166,11 @@ impl Points {
         &self,
         image: &mut [u64],
         before: (&Self, &[u64]),
-        names: &'n [String],
+        names: &'n [[String; 2]],
     ) -> Vec<&'n str> {
         let (points, values) = before;
-        let mut carry = |name: &str| {
-            let (point, old) = (self.find(name)?, points.find(name)?);
+        let mut carry = |[was, is]: &[String; 2]| {
+            let (point, old) = (self.find(is)?, points.find(was)?);
             let (before, now) = (old.declared(), point.declared());
             let stored = old.get(values);
             let value = match before.value_name(stored).filter(|_| now.values.is_some()) {
@@ -181,7 +181,8 @@ impl Points {
             point.set(image, value);
             Some(())
         };
-        names.iter().map(String::as_str).filter(|name| carry(name).is_none()).collect()
+        let lost = names.iter().filter(|names| carry(names).is_none());
+        lost.map(|[was, _]| was.as_str()).collect()
     }
 }
 

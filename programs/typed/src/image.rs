@@ -374,7 +374,7 @@ mod tests {
             points
         };
         let old = points(mode(&[("Off", 0), ("Auto", 1)]));
-        let names = ["want".to_owned()];
+        let names = [["want", "want"].map(str::to_owned)];
         let carried = |new: Declared, stored: u64| {
             let new = points(new);
             let mut image = vec![0x7777];

@@ -1,10 +1,13 @@
 //! An online change between two cluster files: what it replaces, and why it needs a stop where it does.
 
+mod common;
 mod configurations;
 mod differences;
 mod error;
 mod fallback;
+mod later;
 mod plan;
+mod point_fates;
 mod points;
 mod settings;
 mod unfit;
@@ -19,14 +22,17 @@ use understudy_cycle::{
 use understudy_typed::{Fault, Program as TypedProgram, Renamed, Successor};
 use understudy_wire::{ChangeName, ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
+pub use self::common::{CommonPoints, input_name_after, same_point};
 pub use self::configurations::OnlineChanges;
-use self::differences::{Difference, Points, differences};
+use self::differences::{Difference, differences};
 pub use self::error::ChangeError;
 pub use self::fallback::{ChangedFallback, FallbackText};
+pub use self::later::later_settings;
 pub use self::plan::{ChangedInitial, changed_fallbacks, changed_initials, done_pairs, fates};
-pub use self::points::{ChangedPoints, FixedPoints, change_with_points, same_point};
+pub use self::point_fates::{ChangedPoint, PointFate, changed_points};
+pub use self::points::{ChangedPoints, FixedPoints, change_with_points};
 pub use self::settings::ChangedSetting;
-pub use self::unfit::{PairReason, Unfit};
+pub use self::unfit::{PairReason, PointList, Unfit};
 use crate::canonical::points_hash;
 use crate::cluster::Cluster;
 use crate::code::Code;
@@ -117,15 +123,7 @@ impl ChangeTexts {
     /// # Errors
     /// Why it needs a stop.
     pub fn between(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
-        differences(before, after, Points::Stay).map(|found| Self::of(before, after, found))
-    }
-
-    /// The change from one cluster file to another one, in which points may differ.
-    ///
-    /// # Errors
-    /// Why it needs a stop.
-    pub fn with_points(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
-        differences(before, after, Points::MayChange).map(|found| Self::of(before, after, found))
+        differences(before, after).map(|found| Self::of(before, after, found))
     }
 
     fn of(before: &Cluster, after: &Cluster, differences: Vec<Difference>) -> Self {

@@ -319,7 +319,7 @@ impl Code {
     }
 
     /// Paths that have another name in this program than in the one before it: by the pairs of this one, and by those of the other one the way back.
-    fn renamed(&self, before: &Self) -> Vec<Renamed> {
+    pub(crate) fn renamed(&self, before: &Self) -> Vec<Renamed> {
         let back = before.source.renamed.iter().map(|(old, new)| (new.clone(), old.clone()));
         self.source.renamed.iter().cloned().chain(back).collect()
     }

@@ -37,9 +37,11 @@ pub use address::{
 };
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use change::{
-    ChangeError, ChangeTexts, ChangedFallback, ChangedInitial, ChangedPoints, ChangedSetting,
-    ChangedText, FallbackText, FixedPoints, NeedsStop, OnlineChanges, PairReason, ProgramText,
-    Unfit, change_with_points, changed_fallbacks, changed_initials, done_pairs, fates, same_point,
+    ChangeError, ChangeTexts, ChangedFallback, ChangedInitial, ChangedPoint, ChangedPoints,
+    ChangedSetting, ChangedText, CommonPoints, FallbackText, FixedPoints, NeedsStop, OnlineChanges,
+    PairReason, PointFate, PointList, ProgramText, Unfit, change_with_points, changed_fallbacks,
+    changed_initials, changed_points, done_pairs, fates, input_name_after, later_settings,
+    same_point,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Twin, Understudy};
 pub use code::{Code, Unnamed};

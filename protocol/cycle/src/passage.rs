@@ -1,7 +1,7 @@
 //! The points of a program in an online change: those that both programs have, by name and type, and the way of their values.
 //!
 //! ```text
-//!   input that stays     its value goes with it, wherever its bits are
+//!   input that stays     its value goes with it, wherever its bits are, and whatever it comes from: the newest one counts until the next one
 //!   input that is new    its initial value, until it is read or written
 //!   output that stays    what is held, and its ramp, go with it
 //!   output that is new   its fail-safe value where nothing is proved
@@ -9,6 +9,7 @@
 //!
 //! A point with another type is a new one: what its bits would mean is not known.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use understudy_wire::Image;
@@ -90,6 +91,19 @@ impl<'a> Passage<'a> {
     /// `values`, an u(i) of the layout that it leads to, with the inputs that stay as they are in `inputs`.
     pub fn inputs(self, inputs: &Image, values: &Image) -> Image {
         carried(self.places(&self.points.inputs), inputs, values)
+    }
+
+    /// As [`Self::inputs`], with the inputs that the field showed alone; `from` is the layout of `inputs`, in which the others have no value.
+    pub fn field_inputs(self, from: &Layout, inputs: &Image, values: &Image) -> Image {
+        let sourced: BTreeSet<usize> = from.sourced_bits().collect();
+        let places = self.places(&self.points.inputs);
+        let shown = places.filter(|(place, _)| !sourced.contains(&usize::from(place.bit)));
+        carried(shown, inputs, values)
+    }
+
+    /// Whether the input there stays, of the layout that it leads to.
+    pub fn has_input(self, place: PointPlace) -> bool {
+        self.places(&self.points.inputs).any(|(_, to)| to == place)
     }
 
     /// `values`, a y(i) of the layout that it leads to, with the outputs that stay as they are in `outputs`.

@@ -6,13 +6,13 @@
 mod tests;
 
 use smallvec::SmallVec;
-use understudy_cycle::Layout;
+use understudy_cycle::{Layout, Passage};
 use understudy_wire::{Image, Moment};
 
 use super::forcing::Forcing;
 use super::points::Sensed;
 use super::signals::Signals;
-use super::writing::Writing;
+use super::writing::{WithoutEffect, Writing};
 use crate::diagnosis::{Diagnosing, Diagnosis, Observation};
 use crate::settings::Settings;
 
@@ -92,6 +92,33 @@ impl Inputs {
             writing: Writing::new(&layout.operator_inputs),
             signals: Signals::of(layout),
         }
+    }
+
+    /// The newest u(i) without forces.
+    fn unforced(&self, layout: &Layout) -> Image {
+        let mut inputs = self.field.clone();
+        self.writing.put(&layout.operator_inputs, None, &mut inputs);
+        self.signals.put_newest(&layout.signals, &mut inputs);
+        inputs
+    }
+
+    /// Inputs have the places and the sources of the layout that `passage` leads to. One that comes from elsewhere has its newest value until the first
+    /// one from there. Answers with the writes that have no effect.
+    pub(super) fn lay_out(
+        &mut self,
+        old: &Layout,
+        passage: Passage<'_>,
+        moment: Moment,
+    ) -> WithoutEffect {
+        let layout = passage.to();
+        let newest = passage.inputs(&self.unforced(old), &layout.undriven);
+        let shown = |sensors: &Image| passage.field_inputs(old, sensors, &newest);
+        self.sensors = self.sensors.as_ref().map(shown);
+        self.field = shown(&self.field);
+        self.diagnosed = Image::zero(layout.input_width());
+        self.signals.lay_out(old, layout, &|place| passage.input(place));
+        let operated = (&old.operator_inputs[..], &layout.operator_inputs[..]);
+        self.writing.lay_out(operated, moment, (passage, &newest))
     }
 
     /// u(i) of a sample.

@@ -147,7 +147,7 @@ impl RemoteIo {
         } else if let Some(passage) = self.passage(*version, self.laid_out) {
             // The device is not told yet, or has not changed yet: new inputs keep what they have.
             let values = self.inputs.sensors.as_ref().unwrap_or(&self.layout.undriven);
-            self.inputs.sensors = Some(passage.inputs(sensors, values));
+            self.inputs.sensors = Some(passage.field_inputs(layout, sensors, values));
         }
     }
 
@@ -175,20 +175,12 @@ impl RemoteIo {
         let moment = self.moment();
         self.end_all_forces();
         let old = std::mem::replace(&mut self.layout, Arc::clone(passage.to()));
-        let layout = Arc::clone(&self.layout);
         // By changes of the program alone, the device may be of an earlier version with the same points.
         if self.inputs.sensed.layout == old {
             self.inputs.sensed.version = from;
         }
-        let undriven = &layout.undriven;
-        self.inputs.sensors =
-            self.inputs.sensors.take().map(|sensors| passage.inputs(&sensors, undriven));
-        self.inputs.field = passage.inputs(&self.inputs.field, undriven);
-        self.inputs.diagnosed = Image::zero(undriven.width());
-        let operated = (&old.operator_inputs[..], &layout.operator_inputs[..]);
-        let void = self.inputs.writing.lay_out(operated, moment, &|place| passage.input(place));
-        self.inputs.signals.lay_out(&old, &layout, &|place| passage.input(place));
-        if layout.stop.is_none() {
+        let void = self.inputs.lay_out(&old, passage, moment);
+        if self.layout.stop.is_none() {
             self.actuation.execution = Execution::Running;
         }
         self.member.put(Output::LayOut(version));

@@ -85,6 +85,14 @@ impl Signals {
         }
     }
 
+    /// Puts the values of the newest sample into an u(i).
+    pub(super) fn put_newest(&self, signals: &[SignalInput], image: &mut Image) {
+        for (signal, taken) in signals.iter().zip(&self.taken) {
+            let stored = if taken.is_valid { taken.stored } else { signal.default };
+            signal.place.set(image, stored);
+        }
+    }
+
     /// Keeps the newest sample of a source.
     pub(super) fn note(
         &mut self,

@@ -10,12 +10,13 @@
 //! Invariant *One effect*: values and identifiers travel in the same samples, so that stations recall both or neither;
 //! a write that is repeated under its identifier is answered, and not taken again.
 
+mod laid_out;
 mod sessions;
 
 use std::time::Duration;
 
 use smallvec::SmallVec;
-use understudy_cycle::{Output, PointPlace};
+use understudy_cycle::Output;
 use understudy_wire::{
     Image, MAXIMUM_PULSES, Moment, Pulse, Recalled, Time, Write, WriteAnswer, WriteId,
     WriteOutcome, WriteRefusal,
@@ -57,7 +58,7 @@ struct Written {
 pub(super) type Forced<'a> = &'a dyn Fn(u16) -> Option<WriteRefusal>;
 
 /// Writes that have no effect, with the reason.
-type WithoutEffect = SmallVec<[(WriteId, WriteRefusal); 1]>;
+pub(super) type WithoutEffect = SmallVec<[(WriteId, WriteRefusal); 1]>;
 
 /// What became of a write.
 enum Taking {
@@ -317,43 +318,6 @@ impl Writing {
             self.values[input].in_effect = value;
         }
         effective
-    }
-
-    /// The operator inputs are others from now on: those of `old` stay where `moved` tells their place in `new`. One of the same kind keeps its value,
-    /// within its limits, and its writes. Answers with the writes that have no effect.
-    pub(super) fn lay_out(
-        &mut self,
-        (old, new): (&[OperatorInput], &[OperatorInput]),
-        moment: Moment,
-        moved: &dyn Fn(PointPlace) -> Option<PointPlace>,
-    ) -> WithoutEffect {
-        let before = std::mem::replace(&mut self.values, Self::new(new).values);
-        let mut stay = vec![None; old.len()];
-        for (place, (input, written)) in old.iter().zip(before).enumerate() {
-            let to = moved(input.place);
-            let found = new.iter().position(|other| {
-                Some(other.place) == to
-                    && other.is_of_kind(input)
-                    && [written.stored, written.in_effect].iter().all(|it| other.admits(*it))
-            });
-            if let Some(found) = found {
-                stay[place] = Some(found);
-                self.values[found] = written;
-            }
-        }
-        let mut void = WithoutEffect::new();
-        for session in self.sessions.iter_mut() {
-            let Some(input) = session.input else {
-                continue;
-            };
-            session.input = stay[input];
-            session.is_orphaned = session.input.is_none();
-            if session.is_orphaned && session.progress == Progress::Taken {
-                void.push((session.id, WriteRefusal::Void));
-            }
-        }
-        self.sessions.drop_void(&void, moment);
-        void
     }
 
     /// Ends a cycle.

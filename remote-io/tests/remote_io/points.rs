@@ -225,6 +225,49 @@ fn inputs_are_read_by_the_points_of_the_program() {
     assert_eq!(plant.cycle(None, Some(AFTER)).inputs, [true, false]);
 }
 
+/// An input that goes from the operator to the device, or back, keeps its newest value until the first one from there: also while the device is still read
+/// by the points before.
+#[test]
+fn an_input_with_another_source_keeps_its_newest_value() {
+    let level = OperatorInput {
+        place: PointPlace { bit: 0, of: Elementary::Bool },
+        kind: OperatorInputKind::Level,
+        role: Role::Operator,
+        initial: 0,
+        retains: false,
+    };
+    let old = Arc::new(Layout { operator_inputs: vec![level], ..Layout::booleans(2, 1) });
+    let change = change_between(Arc::clone(&old), Layout::booleans(3, 2));
+    let settings = Settings { layout: Arc::clone(&old), ..settings(1) };
+    let mut plant = Plant { bench: Bench::new(settings, 100), sample: None };
+    plant.show(&[false, false]);
+    assert!((0..60).any(|_| !plant.cycle(Some(&[true]), None).inputs.is_empty()), "it starts");
+    let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+    let id = WriteId { session: 1, number: 1 };
+    let (value, role, points) = (true.into(), Role::Operator, Some(old.hash));
+    let write = Write { id, input: 0, value, role, owner, reason, points };
+    plant.bench.tell(RemoteIoInput::Write(&write));
+    plant.order(&ChangeOrder::Prepare(Arc::clone(&change)));
+    for _ in 0..3 {
+        assert_eq!(plant.cycle(Some(&[true]), Some(AFTER)).inputs, [true, false]);
+    }
+    plant.order(&ChangeOrder::Switch(change.name(), NEW));
+    assert_eq!(plant.cycle(Some(&[true, false]), Some(AFTER)).inputs, [false, false, true]);
+    plant.show(&[false, true]);
+    assert_eq!(plant.cycle(None, Some(AFTER)).inputs, [true, false, true]);
+    plant.bench.tell(RemoteIoInput::Points(NEW));
+    assert_eq!(plant.cycle(None, Some(AFTER)).inputs, [true, false, true]);
+    for shown in [false, true] {
+        plant.show(&[false, false, shown]);
+        assert_eq!(plant.cycle(None, Some(AFTER)).inputs, [false, false, shown]);
+    }
+    // Back to the operator: what the device showed last, until it is written.
+    plant.order(&ChangeOrder::Switch(change.name(), OLD));
+    assert_eq!(plant.cycle(None, Some(AFTER)).inputs, [true, false]);
+    plant.show(&[false, false, false]);
+    assert_eq!(plant.cycle(None, Some(AFTER)).inputs, [true, false]);
+}
+
 /// Outputs that are not proved in the cycle of the change: one that stays is held where it is then, and a new one has its fail-safe value. Settings are
 /// those of the configuration before, with the new fail-safe value of the new output.
 #[test]

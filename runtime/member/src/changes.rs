@@ -272,13 +272,15 @@ impl ChangeKeeper for Keeper {
     }
 }
 
-/// The places of points before and after a change that replaces those of the member's program.
+/// The places of points before and after a change that replaces those of the member's program; those of the member's own cluster file are the ones that it has.
 fn learn(wirings: &Wirings, cluster: &Cluster, texts: &ChangeTexts) {
     if texts.points.iter().any(|changed| wirings.are_of(changed)) {
-        let both = [texts.before, texts.after];
-        both.into_iter()
-            .filter_map(|it| cluster.changed(texts, it).ok())
-            .for_each(|it| wirings.learn(&it));
+        let own = cluster.agreement().configuration;
+        let both = [texts.before, texts.after].map(|side| match side == own {
+            true => Some(cluster.clone()),
+            false => cluster.changed(texts, side).ok(),
+        });
+        both.into_iter().flatten().for_each(|it| wirings.learn(&it));
     }
 }
 
@@ -369,7 +371,7 @@ mod tests {
         };
         let before = with("y", "y = \"coil:1\"");
         let after = with("z, y", "y = \"coil:2\", z = \"coil:1\"");
-        let texts = ChangeTexts::with_points(&before, &after).expect("an online change");
+        let texts = ChangeTexts::between(&before, &after).expect("an online change");
         let json = serde_json::to_string(&texts).expect("JSON");
         let folder = std::env::temp_dir().join(format!("understudy-points-{}", std::process::id()));
         fs::create_dir_all(&folder).expect("a folder");
@@ -414,7 +416,7 @@ mod tests {
         };
         let before = with("a, b", &[key("a", true), key("b", false)].join(", "));
         let after = with("c, a", &[key("a", true), key("c", true)].join(", "));
-        let texts = ChangeTexts::with_points(&before, &after).expect("an online change");
+        let texts = ChangeTexts::between(&before, &after).expect("an online change");
         let folder = std::env::temp_dir().join(format!("understudy-inputs-{}", std::process::id()));
         let (_, mut keeper) = start(&folder.join("kept.one.change"), &before);
         keeper.load(&serde_json::to_string(&texts).expect("JSON")).expect("it is of this cluster");

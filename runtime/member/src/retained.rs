@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use understudy_bus::{CarriedOver, FoundFile, FoundNotes, Owner, RetainedFiles, Retention};
-use understudy_cluster::{Cluster, Code, Security, read_kept};
+use understudy_cluster::{Cluster, Code, Security, input_name_after, read_kept};
 use understudy_executable::Scratch;
 use understudy_keys::authority_of;
 use understudy_node::Settings;
@@ -160,18 +160,23 @@ pub(crate) fn retained_notes(
                     }
                 }
                 let noted = &note.recalled.inputs;
+                let names = kept.inputs.iter();
+                let names = names.map(|name| [name.clone(), input_name_after(&before, code, name)]);
+                let names: Vec<[String; 2]> = names.collect();
                 let before = (&old, noted.words());
-                let names = &kept.inputs;
                 let lost = if noted.width() == old.width() {
-                    inputs.carry(image.words_mut(), before, names)
+                    inputs.carry(image.words_mut(), before, &names)
                 } else {
-                    names.iter().map(String::as_str).collect()
+                    names.iter().map(|[was, _]| was.as_str()).collect()
                 };
-                let is_lost =
-                    |name: &&String| lost.contains(&name.as_str()) || !retained.contains(*name);
-                carried.dropped.extend(names.iter().filter(is_lost).cloned());
+                let is_lost = |[was, is]: &&[String; 2]| {
+                    lost.contains(&was.as_str()) || !retained.contains(is)
+                };
+                let dropped = names.iter().filter(is_lost).map(|[was, _]| was.clone());
+                carried.dropped.extend(dropped);
                 carried.kept = names.len() - carried.dropped.len();
-                carried.new = retained.iter().filter(|name| !names.contains(name)).count();
+                let is_new = |name: &&String| names.iter().all(|[_, is]| is != *name);
+                carried.new = retained.iter().filter(is_new).count();
                 note.recalled.inputs = image;
                 note.recalled.version = Some(hash);
             }

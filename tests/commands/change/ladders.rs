@@ -1,6 +1,6 @@
 //! What is proved of a changed ladder, against stations that change: random ladders, their state converted as stations convert it.
 
-use understudy_bits::Switch;
+use understudy_bits::{SameNames, Switch};
 use understudy_cluster::{ChangeTexts, Cluster, Overrides, nearest_of, origins, read_with};
 use understudy_cycle::ProgramChange;
 use understudy_executable::{Executable, Scratch};
@@ -84,7 +84,8 @@ fn check(seed: u64, counts: &mut Counts) {
     }
     let origins = origins(code, next);
     let switch = Switch::AnyScan { origins: &origins };
-    let difference = Difference::between(code.typed(), next.typed(), switch);
+    let same = SameNames::by_name(code.typed(), next.typed());
+    let difference = Difference::between(code.typed(), next.typed(), switch, &same);
     let difference = difference.unwrap_or_else(|error| panic!("{told}\n{error}"));
     let answers = difference.check(Bounds::default(), &mut || {});
     let points = &old.controllers()[0].interface.outputs;

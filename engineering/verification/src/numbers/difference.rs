@@ -1,6 +1,6 @@
 //! Which outputs of a program can differ after an online change: the old program and the new one are followed together on the same inputs.
 
-use understudy_bits::{AnyValue, InTheWay, Inexact, Switch, System};
+use understudy_bits::{AnyValue, InTheWay, Inexact, SameNames, Switch, System};
 use understudy_logic::Circuit;
 use understudy_typed::{Elementary, Program};
 
@@ -17,7 +17,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// A program and the one that takes its place.
+    /// A program and the one that takes its place; `same` are the inputs and outputs that both have.
     ///
     /// # Errors
     /// What of them is not followed.
@@ -25,18 +25,21 @@ impl Difference {
         before: &Program,
         after: &Program,
         switch: Switch<'_>,
+        same: &SameNames,
     ) -> Result<Self, InTheWay> {
-        let system = System::of_change(before, after, switch)?;
+        let system = System::of_change(before, after, switch, same)?;
         let model = Model::of(system, 0, &Asked::default())?;
-        let outputs = after.outputs.iter().map(|point| {
-            let equal = model.alike(&point.name, point.of, switch);
-            (point.name.clone(), equal.always())
+        let outputs = same.compared(before, after).into_iter().filter_map(|names| {
+            let of = after.outputs.find(&names[1])?.of;
+            let equal = model.alike(&names, of, switch);
+            let [_, name] = names;
+            Some((name, equal.always()))
         });
         let outputs = outputs.collect();
         Ok(Self { model, outputs })
     }
 
-    /// The outputs that are compared.
+    /// The outputs that are compared, by their names after the change.
     pub fn outputs(&self) -> impl Iterator<Item = &str> {
         self.outputs.iter().map(|(name, _)| name.as_str())
     }
@@ -67,20 +70,20 @@ impl Difference {
 
 impl Model {
     /// That two programs have an output alike in a scan after the change.
-    fn alike(&self, output: &str, of: Elementary, switch: Switch<'_>) -> Resolved {
+    fn alike(&self, names: &[String; 2], of: Elementary, switch: Switch<'_>) -> Resolved {
         let signal = |name: String| {
             let mut outputs = self.circuit().outputs().iter();
             let found = outputs.position(|output| output.name == name);
             found.map(|place| Formula::Signal(Signal::Output(place)))
         };
         let differs = || {
-            let differs = signal(System::differs(output));
+            let differs = signal(System::differs(&names[1]));
             differs.unwrap_or(Formula::Constant(false)).negated()
         };
         if of != Elementary::Bool {
             return differs();
         }
-        let [old, new] = System::both_of(output).map(signal);
+        let [old, new] = System::both_of(names).map(signal);
         let (Some(old), Some(new)) = (old, new) else {
             return differs();
         };

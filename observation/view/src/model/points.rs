@@ -48,7 +48,7 @@ impl Model {
         let known = self.present.controller(program);
         self.series.lay_out(program, known.map(|known| &known.interface));
         let is_known = known.is_some();
-        let alarms = self.process_alarms.fold.lay_out(program, known);
+        let alarms = self.process_alarms.fold.lay_out(program, &self.present);
         if let Some(history) = self.histories.get_mut(place) {
             history.lay_out(version, is_known);
         }

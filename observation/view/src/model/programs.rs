@@ -4,7 +4,7 @@ use understudy_journal::{Record, Tally, moment};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_wire::{
-    Image, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet, Time,
+    Image, Member, Moment, ProgramHash, ProgramId, ProgramSet, Source, StationId, StationSet, Time,
 };
 
 use super::Model;
@@ -42,6 +42,8 @@ pub(super) struct ProgramTrack {
     /// Whether its outputs were provable in any cycle.
     pub(super) served: bool,
     stop: Stop,
+    /// The program to which its remote I/O has taken a change back by itself.
+    taken_back: Option<ProgramHash>,
 }
 
 impl ProgramTrack {
@@ -52,6 +54,7 @@ impl ProgramTrack {
             tally: Tally::new(most),
             served: false,
             stop: Stop::default(),
+            taken_back: None,
         }
     }
 
@@ -174,8 +177,17 @@ impl Model {
                 alarm = Some("configuration-disputed");
                 None
             }
-            RemoteIoEvent::ChangeTakenBack { .. } => {
+            RemoteIoEvent::ChangeTakenBack { to, .. } => {
+                self.programs[program.index()].taken_back = Some(*to);
                 alarm = Some(CHANGE_TAKEN_BACK);
+                None
+            }
+            // The engineer has switched again.
+            RemoteIoEvent::ProgramChanged { to, .. }
+                if self.programs[program.index()].taken_back.is_some_and(|back| back != *to) =>
+            {
+                self.programs[program.index()].taken_back = None;
+                self.alarms.all_over(&record.name, &[CHANGE_TAKEN_BACK], cycle);
                 None
             }
             RemoteIoEvent::PointsUnknown { .. } => {

@@ -24,6 +24,7 @@ mod past;
 mod points;
 mod process_alarms;
 mod protection;
+mod renamed;
 mod replay;
 mod screen;
 mod state_signals;

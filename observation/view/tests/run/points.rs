@@ -109,7 +109,7 @@ fn write(cycle: u64, input: u16, value: u64) -> Fault {
 
 fn run(faults: Vec<Fault>) -> (Cluster, Vec<Record>) {
     let [old, new] = clusters();
-    let texts = ChangeTexts::with_points(&old, &new).expect("an online change");
+    let texts = ChangeTexts::between(&old, &new).expect("an online change");
     let faults: Vec<Fault> = prepared().into_iter().chain(faults).collect();
     let records = records_of(&old, texts, &faults, CYCLES);
     (old, records)

@@ -16,7 +16,7 @@ mod times;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use understudy_typed::{Comparison, Elementary, Operation, Origin, Program, Taken};
+use understudy_typed::{Comparison, Elementary, Operation, Origin, Point, Points, Program, Taken};
 
 use super::{Outputs, together};
 use crate::System;
@@ -53,6 +53,41 @@ pub enum Switch<'a> {
         /// Where the values of the new program come from; see [`understudy_typed::Successor::origins`].
         origins: &'a [Origin],
     },
+}
+
+/// Which inputs and outputs of two programs are the same one: their names before and after.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct SameNames {
+    /// Inputs.
+    pub inputs: Vec<[String; 2]>,
+    /// Outputs.
+    pub outputs: Vec<[String; 2]>,
+}
+
+impl SameNames {
+    /// Those of the same name and type.
+    pub fn by_name(before: &Program, after: &Program) -> Self {
+        let same = |old: &Points, new: &Points| {
+            let is_same =
+                |point: &&Point| old.find(&point.name).is_some_and(|it| it.of == point.of);
+            new.iter().filter(is_same).map(|it| [it.name.clone(), it.name.clone()]).collect()
+        };
+        Self {
+            inputs: same(&before.inputs, &after.inputs),
+            outputs: same(&before.outputs, &after.outputs),
+        }
+    }
+
+    /// The outputs that both programs have, in the order of the one after: their names before and after. A program that reports no fault has none.
+    pub fn compared(&self, before: &Program, after: &Program) -> Vec<[String; 2]> {
+        let faults = before.outputs.find(Program::FAULT);
+        let of = |name: &str| {
+            let both = self.outputs.iter().find(|[_, now]| now == name).cloned();
+            let is_fault = name == Program::FAULT && faults.is_none();
+            both.or_else(|| is_fault.then(|| [name, name].map(str::to_owned)))
+        };
+        after.outputs.names().filter_map(of).collect()
+    }
 }
 
 /// Why two programs are not compared.
@@ -112,8 +147,8 @@ impl System {
     /// The BOOL that is TRUE from the switch on.
     pub const CHANGED: &'static str = "changed";
 
-    /// `before` and `after` on the same inputs, within their subranges. Outputs are named `old.` and `new.`, then their names; `differs.` and an output is
-    /// TRUE where the two differ after the switch.
+    /// `before` and `after` on the same inputs, within their declarations; an input that is not in `same` may be any. Outputs are named `old.` and `new.`,
+    /// then their names; `differs.` and the name after of an output that both have is TRUE where the two differ after the switch.
     ///
     /// # Errors
     /// What is in the way.
@@ -121,6 +156,7 @@ impl System {
         before: &Program,
         after: &Program,
         switch: Switch<'_>,
+        same: &SameNames,
     ) -> Result<Self, InTheWay> {
         let origins: BTreeMap<u64, Origin> = match switch {
             Switch::Now { .. } => BTreeMap::new(),
@@ -133,7 +169,7 @@ impl System {
             let known = asked.clone();
             let Asked { wanted, least } = known.clone();
             let mut system = Self { wanted, least, keeps_moments: true, ..Self::new(&after.name) };
-            let mut both = system.both(before, after, switch, origins.clone())?;
+            let mut both = system.both((before, after), switch, origins.clone(), same)?;
             let changed = match switch {
                 Switch::Now { before, after } => {
                     system.begin(&both.old, before, &mut asked);
@@ -143,7 +179,7 @@ impl System {
                 Switch::AnyScan { .. } => system.take_over(&mut both, &mut asked),
             };
             if asked == known {
-                system.observe_differences(&both, changed);
+                system.observe_differences(&both, changed, &same.compared(before, after));
                 return Ok(system);
             }
         }
@@ -160,26 +196,34 @@ impl System {
         format!("{DIFFERS}{output}")
     }
 
-    /// The names of an output in the old and in the new program.
-    pub fn both_of(output: &str) -> [String; 2] {
-        [OLD, NEW].map(|prefix| format!("{prefix}{output}"))
+    /// The signals of an output with these names in the old and in the new program.
+    pub fn both_of([old, new]: &[String; 2]) -> [String; 2] {
+        [format!("{OLD}{old}"), format!("{NEW}{new}")]
     }
 
     fn both<'p>(
         &mut self,
-        before: &'p Program,
-        after: &'p Program,
+        (before, after): (&'p Program, &'p Program),
         switch: Switch<'_>,
         origins: BTreeMap<u64, Origin>,
+        same: &SameNames,
     ) -> Result<Both<'p>, Unsupported> {
         let points = before.inputs.iter().filter(|point| point.slot != 0);
         let sources: Vec<Source> = points.map(Source::declared).collect();
         let given = super::sources_as_terms(self, "", &before.inputs, &sources);
-        let known: BTreeMap<&str, Term> =
-            before.inputs.iter().map(|point| point.name.as_str()).zip(given.clone()).collect();
-        let of_new = after.inputs.iter().map(|point| match known.get(point.name.as_str()) {
-            Some(&term) => term,
-            None => self.input(point.name.clone(), point.of, None),
+        let known: BTreeMap<(&str, Elementary), Term> =
+            before.inputs.iter().map(|it| (it.name.as_str(), it.of)).zip(given.clone()).collect();
+        let names: BTreeMap<&str, &str> =
+            same.inputs.iter().map(|[old, new]| (new.as_str(), old.as_str())).collect();
+        let of_new = after.inputs.iter().map(|point| {
+            let known = names.get(point.name.as_str()).and_then(|old| known.get(&(*old, point.of)));
+            if let Some(&term) = known {
+                return term;
+            }
+            // An input of another type is another one.
+            let is_known = before.inputs.find(&point.name).is_some();
+            let prefix = if is_known { NEW } else { "" };
+            self.input(format!("{prefix}{}", point.name), point.of, None)
         });
         let of_new: Vec<Term> = of_new.collect();
         if let Switch::Now { before, .. } = switch {
@@ -426,14 +470,18 @@ impl System {
     }
 
     /// Names where the outputs differ.
-    fn observe_differences(&mut self, both: &Both<'_>, changed: Term) {
+    fn observe_differences(&mut self, both: &Both<'_>, changed: Term, compared: &[[String; 2]]) {
         self.wanted.clear();
         self.numbers.clear();
         self.observed.push((Self::CHANGED.to_owned(), changed));
         let stopped = self.terms.boolean(false);
-        for point in &both.new.program.outputs {
-            let of = |side: &Side<'_>| side.outputs.points.get(&point.name).copied();
-            let [old, new] = [&both.old, &both.new].map(|side| of(side).unwrap_or(stopped));
+        for names in compared {
+            let Some(point) = both.new.program.outputs.find(&names[1]) else {
+                continue;
+            };
+            let sides = [(&both.old, &names[0]), (&both.new, &names[1])];
+            let [old, new] =
+                sides.map(|(side, name)| side.outputs.points.get(name).copied().unwrap_or(stopped));
             let apart = match point.of {
                 Elementary::Bool => {
                     let xor = Operation::Xor(Elementary::Bool);

@@ -1,21 +1,16 @@
 //! What differs between two clusters, program by program, as far as an online change can make it.
 
+use std::collections::BTreeSet;
+
 use understudy_cycle::PointsChange;
 use understudy_wire::ProgramId;
 
-use super::points::{fixed_points, points_change};
+use super::later::changed_links;
+use super::point_fates::changed_points;
+use super::points::{are_other_points, fixed_points, points_change};
 use super::settings::{ChangedSetting, changed_settings};
 use super::{ChangedFallback, NeedsStop, Unfit};
 use crate::cluster::Cluster;
-
-/// What is done with inputs and outputs that differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Points {
-    /// They need a stop.
-    Stay,
-    /// They change with their program.
-    MayChange,
-}
 
 /// What differs of one program.
 pub(super) struct Difference {
@@ -34,54 +29,55 @@ pub(super) struct Difference {
 pub(super) fn differences(
     before: &Cluster,
     after: &Cluster,
-    points: Points,
 ) -> Result<Vec<Difference>, Vec<NeedsStop>> {
     if before.name() != after.name() {
         let (before, after) = (before.name().to_owned(), after.name().to_owned());
         return Err(vec![NeedsStop::OtherCluster { before, after }]);
     }
-    let may_change = points == Points::MayChange;
-    let both = || before.controllers.iter().zip(&after.controllers);
-    let replaced = both().zip(&before.remote_ios).filter(|((old, new), _)| old.hash != new.hash);
-    let of_replaced: Vec<String> =
-        replaced.map(|(_, remote_io)| format!("remote I/O `{}`", remote_io.name)).collect();
+    let both = || {
+        let controllers = before.controllers.iter().zip(&after.controllers);
+        (0..).map(ProgramId).zip(controllers).filter(|(_, (old, new))| old.name == new.name)
+    };
+    let with_points = both().filter(|(program, _)| are_other_points(before, after, *program));
+    let with_points: BTreeSet<ProgramId> = with_points.map(|(program, _)| program).collect();
     // Where the inputs of a program come from is a part of its points.
-    let is_of_points = |setting: &ChangedSetting| matches!(setting, ChangedSetting::Key { of, key, .. } if may_change && key == "`inputs`" && of_replaced.contains(of));
+    let of_points: Vec<String> = with_points
+        .iter()
+        .map(|program| format!("remote I/O `{}`", before.remote_ios[program.index()].name))
+        .collect();
+    let is_of_points = |setting: &ChangedSetting| matches!(setting, ChangedSetting::Key { of, key, .. } if key == "`inputs`" && of_points.contains(of));
     let changed = changed_settings(&before.frame_text, &after.frame_text);
     let others = changed.into_iter().filter(|setting| !is_of_points(setting));
     let mut reasons: Vec<NeedsStop> = others.map(NeedsStop::Setting).collect();
+    reasons.extend(changed_links(before, after).into_iter().map(NeedsStop::Setting));
     let mut differences = Vec::new();
-    for (program, (old, new)) in (0..).map(ProgramId).zip(both()) {
-        if old.name != new.name {
-            continue;
+    for (program, (old, new)) in both() {
+        let is_replaced = old.hash != new.hash;
+        if with_points.contains(&program) {
+            let name = || old.name.clone();
+            if !is_replaced {
+                let points = changed_points(before, after, program);
+                reasons.push(Unfit::Unmarked { program: name(), points: points.into() }.into());
+            }
+            let fixed = fixed_points(before, after, program);
+            reasons.extend(fixed.map(|why| Unfit::Fixed { program: name(), why }.into()));
         }
-        let (mut moved, mut fallback) = (None, None);
-        let unfit: Vec<Unfit> = if may_change {
-            moved = points_change(before, after, program);
-            let fixed = moved.as_ref().map(|_| fixed_points(before, after, program));
-            let fixed = fixed.into_iter().flatten();
-            fixed.map(|why| Unfit::Fixed { program: old.name.clone(), why }).collect()
-        } else {
-            Unfit::points(&old.name, &old.code, &new.code).into_iter().collect()
-        };
-        // The fail-safe values of other outputs are others.
-        let is_compared = may_change || unfit.is_empty();
-        reasons.extend(unfit.into_iter().map(NeedsStop::from));
+        let points = points_change(before, after, program);
+        let mut fallback = None;
         let remote_ios = [before, after].map(|cluster| cluster.remote_ios.get(program.index()));
-        if let ([Some(one), Some(other)], true) = (remote_ios, is_compared) {
+        if let [Some(one), Some(other)] = remote_ios {
             match ChangedFallback::between(program, one, other) {
                 Ok(changed) => fallback = changed,
                 Err(changed) => reasons.push(NeedsStop::Setting(changed)),
             }
         }
-        let is_replaced = old.hash != new.hash;
         if is_replaced {
             let unfit = Unfit::memory(&old.name, &old.code, &new.code).into_iter();
             let unfit = unfit.chain(Unfit::pairs(&old.name, &old.code, &new.code));
             reasons.extend(unfit.map(NeedsStop::from));
         }
         if is_replaced || fallback.is_some() {
-            differences.push(Difference { program, is_replaced, points: moved, fallback });
+            differences.push(Difference { program, is_replaced, points, fallback });
         }
     }
     if reasons.is_empty() { Ok(differences) } else { Err(reasons) }

@@ -6,6 +6,7 @@ use understudy_remote_io::{Fallback, PointPlace};
 use understudy_typed::{CarriedPath, Fate, Point, Renamed};
 
 use super::ChangeTexts;
+use super::common::CommonPoints;
 use super::settings::{ChangedSetting, changed_settings};
 use crate::cluster::Cluster;
 use crate::code::Code;
@@ -18,10 +19,12 @@ pub fn changed_fallbacks(
     texts: &ChangeTexts,
 ) -> Vec<ChangedSetting> {
     let period = before.agreement().schedule.period();
-    let changed = texts.fallbacks.iter().filter_map(|changed| {
-        let place = changed.program.index();
+    let touched = texts.touched();
+    let changed = touched.iter().filter_map(|program| {
+        let place = program.index();
         let both = [before.remote_ios().get(place)?, after.remote_ios().get(place)?];
-        let outputs = &before.controllers().get(place)?.interface.outputs;
+        let common =
+            CommonPoints::of(before.controllers().get(place)?, after.controllers().get(place)?);
         let name = &both[0].name;
         let [old, new] = both.map(|it| format!("remote io {name}\n{}", fallback_text(&it.fallback)));
         let is_of_outputs = |setting: &ChangedSetting| {
@@ -29,16 +32,16 @@ pub fn changed_fallbacks(
         };
         let mut settings = changed_settings(&old, &new);
         settings.retain(|setting| !is_of_outputs(setting));
-        let fallbacks = both.map(|remote_io| &remote_io.fallback);
-        for output in outputs {
+        let [old, new] = both.map(|remote_io| &remote_io.fallback);
+        for [was, is] in &common.outputs {
             let values = [
-                ("fail_safe", fallbacks.map(|fallback| fail_safe_value(output, fallback))),
-                ("ramp", fallbacks.map(|fallback| ramp_value(output, fallback, period))),
+                ("fail_safe", [fail_safe_value(was, old), fail_safe_value(is, new)]),
+                ("ramp", [ramp_value(was, old, period), ramp_value(is, new, period)]),
             ];
             let values = values.into_iter().filter(|(_, [old, new])| old != new);
             settings.extend(values.map(|(key, values)| ChangedSetting::Key {
                 of: format!("remote I/O `{name}`"),
-                key: format!("`{key}.{}`", output.name),
+                key: format!("`{key}.{}`", is.name),
                 values: Some(values),
             }));
         }
@@ -47,7 +50,7 @@ pub fn changed_fallbacks(
     changed.flatten().collect()
 }
 
-fn fail_safe_value(output: &Point, fallback: &Fallback) -> String {
+pub(super) fn fail_safe_value(output: &Point, fallback: &Fallback) -> String {
     let stored = PointPlace::of(output).get(&fallback.fail_safe);
     format!("`{}`", output.declared().text(stored))
 }

@@ -2,24 +2,27 @@
 //!
 //! The points of a program are a part of its version: the change mark of a history tells from which sample on which of them count.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{
-    FallbackChange, Layout, Mode, Moved, OnlineChange, PointPlace, PointsChange, Program,
-    ProgramChange,
+    FallbackChange, Mode, Moved, OnlineChange, OperatorInputKind, PointPlace, PointsChange,
+    Program, ProgramChange,
 };
-use understudy_typed::{Declared, Point, Points};
-use understudy_wire::ProgramId;
+use understudy_typed::Point;
+use understudy_wire::{PointsHash, ProgramId};
 
+use super::common::CommonPoints;
 use super::unfit::different_point;
 use super::{Between, ChangeError, ChangeTexts, Difference, NeedsStop, differences};
 use crate::canonical::points_hash;
-use crate::cluster::{Cluster, Controller};
+use crate::cluster::{Cluster, Controller, RemoteIo};
 use crate::configuration::{FALLBACK, INPUT, input_line};
 use crate::device::Side;
 use crate::read::{Overrides, read_with};
+use crate::source::GroupSignal;
 
 /// The points of a program that change: the sections of its remote I/O before and after.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,6 +63,12 @@ pub enum FixedPoints {
     PaperMode,
     /// Only one of the files has a device for it.
     Device,
+    /// Its device is another one.
+    OtherDevice,
+    /// It reads other programs.
+    OtherSources,
+    /// It reads other signals of other groups.
+    OtherGroups,
 }
 
 impl fmt::Display for FixedPoints {
@@ -71,6 +80,15 @@ impl fmt::Display for FixedPoints {
             Self::ReadByAnother => "another program reads an output of it",
             Self::PaperMode => "the cluster has `mode = \"paper\"`",
             Self::Device => "only one of the files has a device for it",
+            Self::OtherDevice => {
+                "its device has another address or unit, and the remote I/O connects to that when it starts"
+            }
+            Self::OtherSources => {
+                "it reads other programs than before, and a remote I/O learns which ones when it starts"
+            }
+            Self::OtherGroups => {
+                "it reads other signals of other groups, and a gateway learns which ones when it starts"
+            }
         })
     }
 }
@@ -84,7 +102,7 @@ pub fn change_with_points(
     after: &Cluster,
 ) -> Result<OnlineChange, Vec<NeedsStop>> {
     let (mut programs, mut fallbacks) = (Vec::new(), Vec::new());
-    for difference in differences(before, after, super::Points::MayChange)? {
+    for difference in differences(before, after)? {
         let Difference { program, is_replaced, points, fallback } = difference;
         if points.is_some() || fallback.is_some() {
             let settings = |cluster: &Cluster| cluster.remote_ios[program.index()].fallback.clone();
@@ -112,7 +130,16 @@ impl ChangeTexts {
         }
         let (before, after) = if is_before { (cluster, &changed) } else { (&changed, cluster) };
         let change = change_with_points(before, after);
-        change.map_err(|_| ChangeError::NotItsResult { claimed: other })
+        // Such as another device than that of the tool's file: the texts do not tell it.
+        let unfit = |reasons: Vec<NeedsStop>| {
+            reasons.into_iter().find_map(|reason| match reason {
+                NeedsStop::Unfit(unfit) => Some(ChangeError::Unfit(unfit)),
+                _ => None,
+            })
+        };
+        change.map_err(|reasons| {
+            unfit(reasons).unwrap_or(ChangeError::NotItsResult { claimed: other })
+        })
     }
 }
 
@@ -209,44 +236,55 @@ pub(super) fn points_change(
 ) -> Option<PointsChange> {
     let [old, new] = [before, after].map(|cluster| cluster.controllers.get(program.index()));
     let (old, new) = (old?, new?);
-    let (old_layout, new_layout) = (before.layout(program)?, after.layout(program)?);
-    let wired = [before, after].map(|cluster| {
-        let field = cluster.remote_ios.get(program.index())?.field.as_ref()?;
+    // Without a mark, nothing tells when other points of the same program count.
+    if old.hash == new.hash || !are_other_points(before, after, program) {
+        return None;
+    }
+    let common = CommonPoints::of(old, new);
+    Some(PointsChange {
+        before: Arc::new(before.layout(program)?),
+        after: Arc::new(after.layout(program)?),
+        inputs: moved(&common.inputs),
+        outputs: moved(&common.outputs),
+    })
+}
+
+/// Whether the points of a program differ: by name, type or place, in what they come from, or in where they are in the device. More names of values leave
+/// them as they are, and so do other points of a program that it reads.
+pub(super) fn are_other_points(before: &Cluster, after: &Cluster, program: ProgramId) -> bool {
+    let place = program.index();
+    let clusters = [before, after];
+    let layouts = clusters.map(|cluster| {
+        let mut layout = cluster.layout(program)?;
+        layout.hash = PointsHash(0);
+        layout.signal_sources.clear();
+        layout.signals.iter_mut().for_each(|signal| signal.output = 0);
+        Some(layout)
+    });
+    let read = clusters.map(|cluster| {
+        let remote_io = cluster.remote_ios.get(place)?;
+        let signals = remote_io.signals().map(|signal| (signal.input.from, &signal.output));
+        Some((signals.collect::<Vec<_>>(), groups_read(remote_io)))
+    });
+    let wired = clusters.map(|cluster| {
+        let field = cluster.remote_ios.get(place)?.field.as_ref()?;
         let side = |side: &Side| {
             let places = side.bindings.iter().map(|it| (it.name.clone(), it.bit, it.place));
             (side.rest.clone(), places.collect::<Vec<_>>())
         };
         Some((side(&field.inputs), side(&field.outputs)))
     });
-    // More names of values leave the points as they are.
-    let is_equal = Layout { hash: old_layout.hash, ..new_layout.clone() } == old_layout
-        && wired[0] == wired[1];
-    // A device that is wired in another way has other points where the program is another one: without a mark, nothing tells when.
-    if old.hash == new.hash || different_point(&old.code, &new.code).is_none() && is_equal {
-        return None;
-    }
-    Some(PointsChange {
-        before: Arc::new(old_layout),
-        after: Arc::new(new_layout),
-        inputs: moved(&old.interface.inputs, &new.interface.inputs),
-        outputs: moved(&old.interface.outputs, &new.interface.outputs),
-    })
+    let [old, new] = clusters.map(|cluster| cluster.controllers.get(place));
+    let has_other =
+        old.zip(new).is_some_and(|(old, new)| different_point(&old.code, &new.code).is_some());
+    has_other || layouts[0] != layouts[1] || read[0] != read[1] || wired[0] != wired[1]
 }
 
-/// The point that a point of one version of a program is in another one: that of its name and type. An enumeration is of the same type where its names have
-/// the same numbers.
-pub fn same_point<'a>(point: &Point, others: &'a Points) -> Option<&'a Point> {
-    let whole = |point: &Point| Declared { range: None, ..point.declared() };
-    let other = others.find(&point.name)?;
-    let stays = whole(point).takes(&whole(other)) && whole(other).takes(&whole(point));
-    stays.then_some(other)
-}
-
-/// Points of both.
-fn moved(old: &Points, new: &Points) -> Vec<Moved> {
-    let moved = old.iter().filter_map(|before| {
-        let after = same_point(before, new)?;
-        Some(Moved { before: PointPlace::of(before), after: PointPlace::of(after) })
+/// The places of points that both versions have.
+fn moved(common: &[[Point; 2]]) -> Vec<Moved> {
+    let moved = common.iter().map(|both| {
+        let [before, after] = both.each_ref().map(PointPlace::of);
+        Moved { before, after }
     });
     moved.collect()
 }
@@ -260,6 +298,11 @@ pub(super) fn fixed_points(
     let place = program.index();
     let clusters = [before, after];
     let has = move |is: &dyn Fn(&Cluster) -> bool| clusters.iter().any(|cluster| is(cluster));
+    let fields = clusters.map(|it| it.remote_ios[place].field.as_ref());
+    let connections = fields.map(|field| field.map(|it| (&it.connection, it.unit)));
+    let sources: [BTreeSet<ProgramId>; 2] =
+        clusters.map(|it| it.remote_ios[place].signals().map(|signal| signal.input.from).collect());
+    let groups = clusters.map(|it| groups_read(&it.remote_ios[place]));
     let reasons = [
         (FixedPoints::Twin, has(&|it| it.remote_ios[place].twin.is_some())),
         (FixedPoints::Diagnosis, has(&|it| it.remote_ios[place].diagnosis.is_some())),
@@ -272,10 +315,27 @@ pub(super) fn fixed_points(
             }),
         ),
         (FixedPoints::PaperMode, has(&|it| it.agreement.mode == Mode::Paper)),
-        (FixedPoints::Device, {
-            let [old, new] = clusters.map(|it| it.remote_ios[place].field.is_some());
-            old != new
-        }),
+        (FixedPoints::Device, fields[0].is_some() != fields[1].is_some()),
+        (
+            FixedPoints::OtherDevice,
+            fields.iter().all(Option::is_some) && connections[0] != connections[1],
+        ),
+        (FixedPoints::OtherSources, sources[0] != sources[1]),
+        (FixedPoints::OtherGroups, groups[0] != groups[1]),
     ];
     reasons.into_iter().filter_map(|(why, is_so)| is_so.then_some(why))
+}
+
+/// The signals of other groups that a remote I/O reads, with the samples for which a value holds: a gateway writes each under the name of its input.
+fn groups_read(remote_io: &RemoteIo) -> BTreeMap<&str, (Option<&GroupSignal>, u32)> {
+    let read = remote_io.inputs.iter().filter_map(|source| {
+        let operator = source.operator()?;
+        match operator.input.kind {
+            OperatorInputKind::Group { stale_after, .. } => {
+                Some((source.name.as_str(), (operator.group.as_ref(), stale_after)))
+            }
+            _ => None,
+        }
+    });
+    read.collect()
 }

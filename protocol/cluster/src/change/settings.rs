@@ -45,7 +45,7 @@ impl fmt::Display for ChangedSetting {
 
 /// A section of the text of a configuration, with its keys and the text of each.
 #[derive(Debug, Default)]
-struct Section {
+pub(super) struct Section {
     of: String,
     keys: Vec<Key>,
 }
@@ -60,8 +60,19 @@ struct Key {
 /// The differences of two configurations, without their programs: first those of the cluster.
 pub(super) fn changed_settings(before: &str, after: &str) -> Vec<ChangedSetting> {
     let (old, new) = (sections(before), sections(after));
+    let mut changed = changed_sections(&old, &new);
+    let names = |sections: &[Section]| sections.iter().map(|it| it.of.clone()).collect::<Vec<_>>();
+    if changed.is_empty() && names(&old) != names(&new) {
+        let key = "the order of controllers or understudies".to_owned();
+        changed.push(ChangedSetting::Key { of: String::new(), key, values: None });
+    }
+    changed
+}
+
+/// The differences of two lists of sections: first those of the sections before, in their order.
+pub(super) fn changed_sections(old: &[Section], new: &[Section]) -> Vec<ChangedSetting> {
     let mut changed = Vec::new();
-    for section in &old {
+    for section in old {
         match new.iter().find(|other| other.of == section.of) {
             Some(other) => changed.extend(section.changed(other)),
             None => changed.push(ChangedSetting::Section { of: section.of.clone(), is_new: false }),
@@ -72,15 +83,25 @@ pub(super) fn changed_settings(before: &str, after: &str) -> Vec<ChangedSetting>
     changed.extend(
         added.map(|section| ChangedSetting::Section { of: section.of.clone(), is_new: true }),
     );
-    let names = |sections: &[Section]| sections.iter().map(|it| it.of.clone()).collect::<Vec<_>>();
-    if changed.is_empty() && names(&old) != names(&new) {
-        let key = "the order of controllers or understudies".to_owned();
-        changed.push(ChangedSetting::Key { of: String::new(), key, values: None });
-    }
     changed
 }
 
 impl Section {
+    /// A section without keys; `of` says what it is of, and is empty for the cluster.
+    pub(super) fn of(of: &str) -> Self {
+        Self { of: of.to_owned(), keys: Vec::new() }
+    }
+
+    /// A key of the file with its value.
+    pub(super) fn set(&mut self, key: &str, value: impl fmt::Display) {
+        self.add(format!("`{key}`"), &format!("`{value}`"), true);
+    }
+
+    /// What differs in words, with its value.
+    pub(super) fn set_words(&mut self, words: &str, value: &str) {
+        self.add(words.to_owned(), &format!("`{value}`"), true);
+    }
+
     fn changed(&self, other: &Self) -> Vec<ChangedSetting> {
         let value = |section: &Self, name: &str| {
             section.keys.iter().find(|key| key.name == name).map(|key| key.value.clone())

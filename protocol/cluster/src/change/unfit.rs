@@ -1,7 +1,10 @@
 //! Why a program cannot take the place of another one while it runs.
 
+use std::fmt;
+
 use understudy_typed::{Fate, WrongPair};
 
+use super::point_fates::ChangedPoint;
 use super::points::FixedPoints;
 use crate::code::{Code, Unnamed};
 
@@ -23,6 +26,16 @@ pub enum Unfit {
         program: String,
         /// Why.
         why: FixedPoints,
+    },
+    /// The points of a program differ, and the program does not: without a change mark nothing tells from which cycle on they count.
+    #[error(
+        "inputs or outputs of `{program}` change, and its program does not: only a changed program brings others while it runs ({points})"
+    )]
+    Unmarked {
+        /// Name of the controller.
+        program: String,
+        /// What becomes of them.
+        points: PointList,
     },
     /// States of the program before or after cannot be converted.
     #[error("`{program}` cannot change while it runs: one of the two programs {why}")]
@@ -46,6 +59,35 @@ pub enum Unfit {
     },
 }
 
+/// Points that change, as a message lists them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PointList(Vec<ChangedPoint>);
+
+/// Points that a message lists, at most.
+const MOST_POINTS: usize = 8;
+
+impl From<Vec<ChangedPoint>> for PointList {
+    fn from(points: Vec<ChangedPoint>) -> Self {
+        Self(points)
+    }
+}
+
+impl fmt::Display for PointList {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(points) = self;
+        if points.is_empty() {
+            return formatter.write_str("the order of `inputs`");
+        }
+        let told = points.iter().take(MOST_POINTS);
+        let told: Vec<String> = told.map(|it| format!("{} {it}", it.fate.word())).collect();
+        formatter.write_str(&told.join("; "))?;
+        match points.len().saturating_sub(MOST_POINTS) {
+            0 => Ok(()),
+            more => write!(formatter, "; and {more} more"),
+        }
+    }
+}
+
 /// Why a pair of `renamed` does not fit.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PairReason {
@@ -66,7 +108,10 @@ impl Unfit {
     /// The code of its page.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Points { .. } | Self::Fixed { .. } | Self::Memory { .. } => "U0630",
+            Self::Points { .. }
+            | Self::Fixed { .. }
+            | Self::Unmarked { .. }
+            | Self::Memory { .. } => "U0630",
             Self::Pair { .. } => "U0637",
         }
     }
