@@ -1,7 +1,7 @@
 //! The value of a point in an image that is written as bits, `0110`.
 
 use serde_json::Value;
-use understudy_cluster::Controller;
+use understudy_cluster::{Card, Controller};
 use understudy_typed::{Declared, Elementary, Point, Points, Program};
 use understudy_wire::{Force, Image, SignalPlace};
 
@@ -50,6 +50,12 @@ pub(crate) fn stored_text(declared: &Declared, stored: u64) -> String {
         return understudy_cluster::value_text(declared, stored).replace('"', "");
     }
     value_text(&shown(declared, stored))
+}
+
+/// A stored value as a scale shows it: with the decimals and the unit of its card.
+pub(crate) fn card_text(card: &Card, declared: &Declared, stored: u64) -> String {
+    let rounded = card.rounded(declared, stored);
+    card.with_unit(rounded.unwrap_or_else(|| stored_text(declared, stored)))
 }
 
 /// The values of the declared points of an image as people read them: `level = 2.5, run = 1`.
