@@ -212,7 +212,7 @@ impl<'t> Scan<'t> {
             let number = known.entry(fires.to_lowercase()).or_insert(0);
             *number += 1;
             let fires = if *number > 1 { format!("{fires}.{number}") } else { fires };
-            let Some((truth, values)) = self.transition(&fires) else {
+            let Some((truth, values)) = self.transition(&fires, transition.from.len()) else {
                 continue;
             };
             transition.truth = Some(truth);
@@ -224,9 +224,14 @@ impl<'t> Scan<'t> {
     }
 
     /// What the condition of a transition came to, and the values that it read; nothing where a step before it was not active, or one of higher priority
-    /// fired. The statement is `fires := step.X AND NOT other AND_THEN condition`.
-    fn transition(&self, fires: &str) -> Option<(bool, String)> {
-        let address = self.part(fires)?.address;
+    /// fired. The statement is `fires := step.X AND NOT other AND_THEN condition`, with `steps` steps.
+    fn transition(&self, fires: &str, steps: usize) -> Option<(bool, String)> {
+        let is_named = |known: &str| {
+            let own = known.strip_prefix(self.unit).and_then(|name| name.strip_prefix('.'));
+            own.unwrap_or(known).eq_ignore_ascii_case(fires)
+        };
+        let mut hidden = self.typed.hidden.iter();
+        let address = 64 * u64::from(hidden.find(|known| is_named(&known.name))?.slot);
         let is_it = |done: &&Done| matches!(done.effect, Effect::Assigned { address: at, .. } if at == address);
         let done = self.trace.done.iter().find(is_it)?;
         let Effect::Assigned { value: Some((_, truth)), .. } = done.effect else {
@@ -234,17 +239,18 @@ impl<'t> Scan<'t> {
         };
         let mut values = Vec::new();
         let mut is_before = true;
-        for read in &done.reads {
-            let part = self.typed.part_at(read.address)?;
-            let own = part.name.strip_prefix(self.unit).and_then(|name| name.strip_prefix('.'));
-            let name = own.unwrap_or(&part.name);
-            is_before &= name.starts_with("fires.") || name.ends_with(".X");
-            let expected = u64::from(!name.starts_with("fires."));
-            if is_before && read.value != expected {
+        for (place, read) in done.reads.iter().enumerate() {
+            let mut hidden = self.typed.hidden.iter();
+            let is_other = hidden.any(|known| 64 * u64::from(known.slot) == read.address);
+            is_before &= place < steps || is_other;
+            if is_before && read.value != u64::from(!is_other) {
                 return None;
             }
-            if !is_before {
-                values.push(format!("{name} = {}", drawn(&part.declared()?, read.value)));
+            let part = self.typed.part_at(read.address).filter(|_| !is_before);
+            if let Some((declared, name)) = part.and_then(|it| Some((it.declared()?, it.name))) {
+                let own = name.strip_prefix(self.unit).and_then(|name| name.strip_prefix('.'));
+                let name = own.unwrap_or(&name);
+                values.push(format!("{name} = {}", drawn(&declared, read.value)));
             }
         }
         let values =
@@ -255,8 +261,9 @@ impl<'t> Scan<'t> {
     /// The statements of the program as they are written, those that were executed marked, with the values after the scan.
     fn body(&self, lines: &[ShownLine]) -> String {
         let is_word = |line: &ShownLine, word: &str| {
-            let first = line.text.split_whitespace().next().unwrap_or_default();
-            first.trim_end_matches(';').eq_ignore_ascii_case(word)
+            let mut words =
+                line.text.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+            words.any(|own| own.eq_ignore_ascii_case(word))
         };
         let begins = |line: &ShownLine| {
             let mut words = line.text.split_whitespace();

@@ -58,11 +58,11 @@ pub(crate) fn card_text(card: &Card, declared: &Declared, stored: u64) -> String
     card.with_unit(rounded.unwrap_or_else(|| stored_text(declared, stored)))
 }
 
-/// The values of the declared points of an image as people read them: `level = 2.5, run = 1`.
-pub(crate) fn named_text(points: &Points, image: &Image) -> String {
+/// The values of the declared points of an image as people read them, with all digits: `level = 2.5 m, run = 1`.
+pub(crate) fn named_text(points: &Points, image: &Image, card: impl Fn(&str) -> Card) -> String {
     let points = points.iter().filter(|point| is_declared(&point.name));
     let texts = points.map(|point| {
-        let text = point_text(point, image);
+        let text = card(&point.name).with_unit(point_text(point, image));
         format!("{} = {text}", point.name)
     });
     texts.collect::<Vec<String>>().join(", ")

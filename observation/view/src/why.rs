@@ -305,6 +305,8 @@ impl Model {
             sampled.clone().flat_map(|it| value::named(&controller.interface.inputs, &it.inputs));
         let has_numbers = has_numbers(controller);
         let mut sampled = sampled.filter(|_| has_numbers);
+        let points = self.points_in(Some(step.cycle));
+        let card = |name: &str| points.cluster().card(program, name);
         Ok(Why {
             at: None,
             signal: name.to_owned(),
@@ -320,7 +322,7 @@ impl Model {
             inputs: inputs.collect(),
             inputs_text: sampled
                 .next()
-                .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
+                .map(|it| named_text(&controller.interface.inputs, &it.inputs, card)),
             of: match output {
                 Some(output) => Some(output.declared()),
                 None => typed.part(name).and_then(|part| part.declared()),
@@ -433,9 +435,11 @@ impl Model {
             let controller = named_by(program, image).into_iter();
             controller.flat_map(|it| value::named(&it.interface.outputs, image)).collect()
         };
+        let points = self.points_in(Some(step.cycle));
         let values_text = |program: ProgramId, image: &Image| {
             let controller = named_by(program, image).filter(|it| has_numbers(it))?;
-            Some(named_text(&controller.interface.outputs, image))
+            let card = |name: &str| points.cluster().card(program, name);
+            Some(named_text(&controller.interface.outputs, image, card))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;
