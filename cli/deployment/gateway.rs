@@ -93,7 +93,7 @@ for a cluster file that you trust: the command has the rights of this process (d
     },
     /// Print the register map of the Modbus TCP server, or the list of tags
     #[command(
-        after_help = "Example:\n  understudy gateway registers runs/latest\n  understudy gateway registers cluster.toml --csv"
+        after_help = "Example:\n  understudy gateway registers runs/latest\n  understudy gateway registers examples/heated-tank/cluster.toml --csv"
     )]
     Registers {
         /// Directory of a run, or cluster file
