@@ -213,11 +213,10 @@ impl Model {
         let mut why = self.why_at(program, history, &name, place)?;
         why.at = self.times.of_cycle(why.cycle);
         let points = self.points_in(Some(why.cycle));
-        let unit = |name: &str| points.cluster().card(program, name).unit;
-        why.unit = unit(&why.signal);
+        why.unit = points.cluster().card(program, &why.signal).unit;
         if let Some(reason) = &mut why.because {
             reason.is_timed(&self.times);
-            reason.has_units(&unit);
+            reason.has_units(&|name| points.cluster().card(program, name).unit);
         }
         if cycle.is_none() {
             let newest = self.newest();
