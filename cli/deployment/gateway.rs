@@ -9,8 +9,9 @@ use std::time::SystemTime;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use understudy_bus::interruption;
+use understudy_cluster::Overrides;
 use understudy_gateway::{
-    Area, Followed, GatewayError, Notified, PlantMetrics, Rate, RegisterMap, Run, WriteGate,
+    Followed, GatewayError, Notified, PlantMetrics, Rate, RegisterMap, Run, WriteGate,
     forward_signals, mirror, notify, serve_metrics, serve_modbus,
 };
 use understudy_keys::{Date, OperatorKeys};
@@ -19,6 +20,7 @@ use understudy_view::FollowedPlant;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::files;
 use crate::inspect::plant;
 use crate::overrides::parse_address;
 use crate::plants;
@@ -89,11 +91,17 @@ for a cluster file that you trust: the command has the rights of this process (d
         #[command(flatten)]
         run: RunArgument,
     },
-    /// Print the register map of the Modbus TCP server
-    #[command(after_help = "Example:\n  understudy gateway registers runs/latest")]
+    /// Print the register map of the Modbus TCP server, or the list of tags
+    #[command(
+        after_help = "Example:\n  understudy gateway registers runs/latest\n  understudy gateway registers examples/heated-tank/cluster.toml --csv"
+    )]
     Registers {
-        #[command(flatten)]
-        run: RunArgument,
+        /// Directory of a run, or cluster file
+        #[arg(value_name = "RUN|CLUSTER.toml", default_value = "runs/latest")]
+        run: PathBuf,
+        /// Print a list of tags as CSV: name, address, type, unit, range and description
+        #[arg(long)]
+        csv: bool,
     },
     /// Write the signals of other groups to the inputs of a run
     #[command(
@@ -200,9 +208,16 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             let counts = json!({ "delivered": delivered, "undelivered": undelivered });
             Ok(Answer::done(text.as_str(), counts))
         }
-        What::Registers { run } => {
-            let map = RegisterMap::new(run.open()?.cluster()).map_err(failed)?;
-            Ok(Answer::done(table(&map), json!({ "registers": map.places() })))
+        What::Registers { run, csv } => {
+            let (map, reports) = if run.is_file() {
+                let (cluster, reports) = files::cluster(run, Overrides::default())?;
+                (RegisterMap::new(&cluster), reports)
+            } else {
+                (RegisterMap::new(Run::open(run)?.cluster()), Vec::new())
+            };
+            let map = map.map_err(failed)?;
+            let text = if *csv { map.tags() } else { table(&map) };
+            Ok(Answer::done(text, json!({ "registers": map.places() })).with_used(reports))
         }
         What::Zenoh { run, listen, rate, allow_writes } => {
             let run = run.open()?;
@@ -227,11 +242,7 @@ fn table(map: &RegisterMap) -> String {
     let width = map.places().iter().map(|place| place.name.chars().count());
     let width = width.max().unwrap_or(0);
     for place in map.places() {
-        let area = match place.area {
-            Area::DiscreteInput => "discrete input",
-            Area::Coil => "coil",
-            Area::Register => "register",
-        };
+        let area = place.area.word();
         let last = place.address + (place.width - 1);
         let addresses = match place.width {
             1 => place.address.to_string(),

@@ -319,6 +319,14 @@ pub(crate) fn write_report(
     cluster: Option<&Cluster>,
     measured: Option<Assessment>,
 ) -> Result<String, Answer> {
+    if folder.extension().is_some_and(|it| ["html", "json", "csv"].iter().any(|of| it == *of)) {
+        let message = format!(
+            "{} is to be a folder, into which reliability.html, .json and .csv are written: give a name without an ending, such as `{}`",
+            folder.display(),
+            folder.with_extension("").display()
+        );
+        return Err(Answer::failed(Status::BadInput, "U0602", message));
+    }
     let title = cluster.map_or_else(
         || format!("{} controllers", options.controllers),
         |cluster| cluster.name().to_owned(),

@@ -254,6 +254,7 @@ pub fn report(data: &ReportData) -> Result<Report, ReliabilityError> {
     environment.add_filter("grouped", grouped);
     environment.add_filter("small", |value: f64| format!("{value:.4e}"));
     environment.add_filter("probability", probability);
+    environment.add_filter("years", years);
     environment.add_filter("fixed", |value: f64, digits: usize| format!("{value:.digits$}"));
     environment.add_template("report.html", TEMPLATE).map_err(refused)?;
     let template = environment.get_template("report.html").map_err(refused)?;
@@ -267,6 +268,19 @@ pub fn report(data: &ReportData) -> Result<Report, ReliabilityError> {
     let json = serde_json::to_string_pretty(data)
         .map_err(|error| ReliabilityError::Report { why: error.to_string() })?;
     Ok(Report { html, json, csv: csv(data) })
+}
+
+/// A year of 365.25 days, in hours.
+const YEAR: f64 = 8766.0;
+
+/// A long time in years behind the hours; nothing below a year.
+fn years(hours: f64) -> String {
+    let years = hours / YEAR;
+    match years {
+        _ if !(1.0..).contains(&years) => String::new(),
+        _ if years < 10.0 => format!(" ({years:.1} years)"),
+        _ => format!(" ({} years)", grouped(years.round())),
+    }
 }
 
 /// Drawings are this program's own and must not be escaped.

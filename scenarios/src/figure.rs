@@ -6,8 +6,9 @@
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use understudy_cluster::{same_point, value_text};
+use understudy_journal::Members;
 use understudy_typed::{Elementary, Point, Points};
-use understudy_wire::Image;
+use understudy_wire::{Image, ProgramId};
 
 use crate::account::{Account, Interval, Presence, Service, TRACED_CYCLES, Trace};
 use crate::summary::Summary;
@@ -214,7 +215,8 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
             }
             lanes.extend(position_lanes(&trace.positions, &signals.positions));
             let points = [(0, signals.input_points.clone())];
-            lanes.extend(point_lanes(&trace.sensors, &points));
+            let unit = |name: &str| unit_of(&terms.members, program, name);
+            lanes.extend(point_lanes(&trace.sensors, &points, unit));
         }
         let summary = summary.plants.iter().find(|plant| plant.name == plant_name);
         panels.push(Panel {
@@ -233,7 +235,8 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
             bit_lanes(trace, &names)
         } else {
             let signals = terms.signals.get(station.index());
-            signals.map_or_else(Vec::new, |own| point_lanes(trace, &own.output_points))
+            let unit = |name: &str| unit_of(&terms.members, ProgramId(station.0), name);
+            signals.map_or_else(Vec::new, |own| point_lanes(trace, &own.output_points, unit))
         };
         let kind = if understudy { "understudy" } else { "controller" };
         let what = if understudy { "parity outputs" } else { "outputs" };
@@ -298,7 +301,11 @@ fn values_of<'a>(
 }
 
 /// A lane for each point that the program had: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
-fn point_lanes(trace: &Trace<Image>, stretches: &[(u64, Points)]) -> Vec<Lane> {
+fn point_lanes(
+    trace: &Trace<Image>,
+    stretches: &[(u64, Points)],
+    unit: impl Fn(&str) -> String,
+) -> Vec<Lane> {
     let mut all: Vec<&Point> = Vec::new();
     for (place, (_, points)) in stretches.iter().enumerate() {
         let is_new = |point: &&Point| {
@@ -312,13 +319,17 @@ fn point_lanes(trace: &Trace<Image>, stretches: &[(u64, Points)]) -> Vec<Lane> {
         let (name, share): (String, Box<dyn Fn(f64) -> f64>) = match ends {
             _ if point.of == Elementary::Bool => (point.name.clone(), Box::new(|value| value)),
             Some((low, high)) if point.of.number(low) < point.of.number(high) => {
-                let name = format!("{} {} … {}", point.name, text(point, low), text(point, high));
+                let (least, most) = (text(point, low), text(point, high));
+                let name = format!("{} {least} … {most}{}", point.name, unit(&point.name));
                 let (low, high) = (point.of.number(low), point.of.number(high));
                 let share =
                     move |value: f64| ((value - low) / (high - low) * HEIGHTS).round() / HEIGHTS;
                 (name, Box::new(share))
             }
-            Some((low, _)) => (format!("{} {}", point.name, text(point, low)), Box::new(|_| 0.5)),
+            Some((low, _)) => {
+                let name = format!("{} {}{}", point.name, text(point, low), unit(&point.name));
+                (name, Box::new(|_| 0.5))
+            }
             None => (point.name.clone(), Box::new(|_| 0.5)),
         };
         let values = values().map(|(from, to, stored)| (from, to, point.of.number(stored)));
@@ -330,6 +341,13 @@ fn point_lanes(trace: &Trace<Image>, stretches: &[(u64, Points)]) -> Vec<Lane> {
         }
     });
     lanes.collect()
+}
+
+/// The unit of an input or output, as it stands behind a value.
+fn unit_of(members: &Members, program: ProgramId, name: &str) -> String {
+    let mut signals = members.inputs(program).chain(members.outputs(program));
+    let signal = signals.find(|signal| signal.name == name);
+    signal.map_or_else(String::new, |signal| signal.card.with_unit(String::new()))
 }
 
 /// The least and the greatest of these stored values; nothing where none is a number.
@@ -447,7 +465,7 @@ mod tests {
         trace.push(1, &image(&before, &[("stays", 1), ("goes", 1), ("retyped", 0)]));
         trace.push(2, &image(&after, &[("stays", 1), ("comes", 5), ("retyped", 7)]));
         trace.push(3, &image(&after, &[("stays", 0), ("comes", 9), ("retyped", 7)]));
-        let lanes = point_lanes(&trace, &[(0, before), (2, after)]);
+        let lanes = point_lanes(&trace, &[(0, before), (2, after)], |_| String::new());
         let found: Vec<(&str, &[Step])> =
             lanes.iter().map(|lane| (lane.name.as_str(), &lane.steps[..])).collect();
         let expected: [(&str, &[Step]); 5] = [

@@ -386,3 +386,37 @@ fn grafanas_own_model_reads_the_dashboard_whole() {
     let errors = String::from_utf8_lossy(&read.stderr);
     assert!(read.status.success(), "{errors}");
 }
+
+/// A SCADA imports names, addresses, types and cards from one list; the cluster file is enough for it.
+#[test]
+fn the_tags_of_a_cluster_are_a_list_as_csv() {
+    let cluster = "examples/heated-tank/cluster.toml";
+    let answer = understudy(&["gateway", "registers", cluster, "--csv"]);
+    assert_eq!(answer.status, 0, "{}", answer.errors);
+    let mut lines = answer.output.split("\r\n");
+    let heads =
+        "name,table,address,registers,type,writable,unit,decimals,low,high,group,description";
+    assert_eq!(lines.next(), Some(heads));
+    let rows: Vec<&str> = lines.filter(|line| !line.trim().is_empty()).collect();
+    let json = understudy(&["gateway", "registers", cluster, "--csv", "--json"]).json();
+    let places = json["result"]["registers"].as_array().expect("places");
+    assert_eq!(rows.len(), places.len());
+    let named = |name: &str| rows.iter().find(|row| row.starts_with(name)).copied();
+    let place = places.iter().find(|place| place["name"] == "temperature.temperature");
+    let place = place.expect("a signal");
+    let address = &place["address"];
+    let expected = format!(
+        "temperature.temperature,register,{address},2,REAL,false,°C,1,0,60,batch,Temperature of the batch"
+    );
+    assert_eq!(named("temperature.temperature,"), Some(expected.as_str()));
+    assert_eq!((&place["unit"], &place["high"]), (&"°C".into(), &60.0.into()));
+    let drain =
+        "level.drain,discrete input,0,1,BOOL,false,,,,,tank,\"Push button, or the end of a batch\"";
+    assert_eq!(named("level.drain,"), Some(drain));
+    assert!(named("run.cycle,register,2,2,UDINT,false,,,,,,").is_some(), "{rows:?}");
+    let text = understudy(&["gateway", "registers", cluster]).output;
+    assert!(
+        text.contains("REAL in °C: input, as last sampled; Temperature of the batch"),
+        "{text}"
+    );
+}

@@ -56,6 +56,35 @@ async function drawing() {
   await picture("numbers-why");
 }
 
+// Values have the decimals and the unit of their cards, and numbers no lamp.
+async function cards() {
+  const value = (name) => `[...document.querySelectorAll(".signal")].find((row) => row.querySelector(".signal-name").textContent === ${JSON.stringify(name)})`;
+  await open("cluster");
+  await until("a value with its unit", `/^\\d+\\.\\d °C$/.test(${value("temperature")}?.querySelector(".signal-value").textContent ?? "")`);
+  const lamps = await evaluate(`["temperature", "drain"].map((name) => [...document.querySelectorAll(".signal")].find((row) => row.querySelector(".signal-name").textContent === name).querySelectorAll(".lamp").length)`);
+  if (lamps.join() !== "0,1") {
+    problems.push(`the lamps of a number and a BOOL are ${lamps}`);
+  }
+  await open("watch?signals=1.input.0,0.output.1");
+  await until("its unit in the table", `[...document.querySelectorAll(".watch-value")].some((cell) => cell.textContent.endsWith("°C"))`);
+}
+
+// Two numbers in one lane, each on a scale of its side, with the ranges of their cards.
+async function scales() {
+  await open("trends?signals=0.input.0,1.input.0,0.output.1&scales=0.input.0:left,1.input.0:right&span=100");
+  await until("values with their units", `[...document.querySelectorAll(".u-legend .u-value")].some((value) => value.textContent.endsWith("°C"))`);
+  const chosen = await evaluate(`[...document.querySelectorAll("#trend-scales select")].map((choice) => choice.value).join()`);
+  if (chosen !== "left,right") {
+    problems.push(`the scales are ${chosen}`);
+  }
+  const shared = await evaluate(`document.querySelector("#trend-plot .u-over").getBoundingClientRect().width`);
+  await picture("numbers-scales");
+  await accessible("scales", axe);
+  await change('#trend-scales select[data-signal="1.input.0"]', "own");
+  await until("its address without it", `!location.hash.includes("right") && location.hash.includes("0.input.0:left")`);
+  await until("no scale at the right", `document.querySelector("#trend-plot .u-over").getBoundingClientRect().width > ${shared}`);
+}
+
 async function drive() {
   await evaluate("localStorage.setItem('tour', 'seen'), document.querySelector('[data-tour=skip]')?.click()");
   await scheme("light");
@@ -66,6 +95,8 @@ async function drive() {
   await drawing();
   await change("#ladder-view", "text");
   await until("the text again", `document.querySelectorAll(".program-text tbody tr").length > 3`);
+  await cards();
+  await scales();
 }
 
 run(drive);

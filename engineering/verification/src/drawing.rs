@@ -84,8 +84,8 @@ pub fn draw_runs(
     }
     Ok(format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>Runs of {name}</title>\n<style>\n{STYLE}\n</style>\n</head>\n\
-         <body>\n<h1>Runs of {name}</h1>\n<p class=\"soft\">Thick lines have power. A filled contact or coil is closed, or on. Values stand behind the \
-         names, as they were in that place of the scan.</p>\n{body}</body>\n</html>\n",
+         <body>\n<main>\n<h1>Runs of {name}</h1>\n<p class=\"soft\">Thick lines have power. A filled contact or coil is closed, or on. Values stand behind the \
+         names, as they were in that place of the scan.</p>\n{body}</main>\n</body>\n</html>\n",
         name = escaped(&program.name)
     ))
 }

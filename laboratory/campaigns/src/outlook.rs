@@ -55,7 +55,7 @@ pub fn look_ahead(
     if observed.repairs == 0 {
         let Some(mttr) = mttr else {
             return Err(vec![ReliabilityError::Measurement {
-                why: "the journal shows no repair that came to its end; say how long one takes (--mttr)"
+                why: "the journal shows no repair that came to its end: give the time that one takes (--mttr), or let a station be killed and restarted in the run, with a scenario, `operate` or the page"
                     .into(),
             }]);
         };

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use understudy_cluster::Cluster;
 use understudy_journal::PointsInEffect;
 use understudy_view::{Alarm, Bounds, Event, Following, Model, Progress, Reading, Run, Snapshot};
-use understudy_wire::ProgramId;
+use understudy_wire::{Image, ProgramId};
 
 use crate::error::GatewayError;
 use crate::metrics::Metrics;
@@ -39,9 +39,9 @@ pub struct Followed {
 pub struct Observation {
     /// The snapshot that every view shows.
     pub snapshot: Arc<Snapshot>,
-    /// By program: x(i) at its last sample, element 1 first; nothing where the journal does not contain it, and where an online change has replaced the
+    /// By program: x(i) at its last sample, as stations hold it; nothing where the journal does not contain it, and where an online change has replaced the
     /// program with which the run began.
-    pub states: Vec<Option<Vec<bool>>>,
+    pub states: Vec<Option<Image>>,
     /// The newest events, oldest first.
     pub recent: Vec<Event>,
     /// The alarms that are open, and the newest of the others, in the order of their numbers.
@@ -71,7 +71,7 @@ impl Observation {
             let mut steps = steps.filter(|step| step.cycle <= until);
             let sampled = steps.find_map(|step| step.sampled.as_ref())?;
             let first = model.cluster().controllers().get(program.index())?.hash;
-            (sampled.program == first).then(|| sampled.state.bits().collect())
+            (sampled.program == first).then(|| sampled.state.clone())
         };
         let mut recent: Vec<Event> = model.events().rev().take(RECENT).cloned().collect();
         recent.reverse();

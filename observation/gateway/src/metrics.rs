@@ -29,8 +29,10 @@ use crate::labels::{
 };
 
 /// Bounds of the buckets of times within a cycle, as shares of the time to the deadline.
-const SHARES: [f64; 15] =
-    [0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
+const SHARES: [f64; 20] = [
+    0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.92, 0.94, 0.96,
+    0.98, 0.99, 1.0,
+];
 
 /// Bounds of the buckets of the times between cycles, as shares of the period.
 const CYCLE_SHARES: [f64; 11] = [0.5, 0.9, 0.95, 0.99, 1.01, 1.05, 1.1, 1.5, 2.0, 5.0, 10.0];

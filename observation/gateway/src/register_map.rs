@@ -10,12 +10,13 @@
 //! Numbers of 32 bits take two registers and numbers of 64 bits four, the most significant one first. Addresses are those on the wire, from 0.
 
 mod image;
+mod tags;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use tokio_modbus::ExceptionCode;
-use understudy_cluster::{Cluster, OperatorDeclaration, value_text};
+use understudy_cluster::{CardFacts, Cluster, OperatorDeclaration, value_text};
 use understudy_executable::Interface;
 use understudy_remote_io::OperatorInputKind;
 use understudy_typed::{Declared, Elementary, Point};
@@ -56,7 +57,7 @@ pub enum Area {
 }
 
 /// One line of the map.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Place {
     /// Its table.
     pub area: Area,
@@ -70,6 +71,12 @@ pub struct Place {
     pub meaning: Cow<'static, str>,
     /// Whether it is an operator input.
     pub writable: bool,
+    /// Its type, `REAL`; of a register that is no signal an unsigned integer.
+    #[serde(rename = "type")]
+    pub of: Cow<'static, str>,
+    /// How a signal is shown.
+    #[serde(flatten)]
+    pub card: CardFacts,
 }
 
 /// An operator input.
@@ -84,7 +91,7 @@ pub(crate) struct Target {
 }
 
 /// The map of one cluster.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RegisterMap {
     places: Vec<Place>,
     /// u(i) and y(i), point by point.
@@ -151,23 +158,28 @@ impl RegisterMap {
         let mut places = Vec::new();
         let (mut coils, mut first_coil) = (Vec::new(), 0);
         for (area, meaning) in [(Area::DiscreteInput, INPUT), (Area::Coil, OUTPUT)] {
-            let signals = programs.iter().flat_map(|program| {
+            let signals = (0..).map(ProgramId).zip(programs).flat_map(|(of, program)| {
                 let Interface { inputs, outputs } = &program.interface;
                 let points = match area {
                     Area::DiscreteInput => inputs,
                     _ => outputs,
                 };
                 let bits = points.iter().filter(|point| point.of == Elementary::Bool);
-                bits.map(move |point| format!("{}.{}", program.name, point.name))
+                bits.map(move |point| {
+                    let card = cluster.card(of, &point.name).facts(point.of);
+                    (format!("{}.{}", program.name, point.name), card)
+                })
             });
             let first = places.len();
-            places.extend(signals.enumerate().map(|(address, name)| Place {
+            places.extend(signals.enumerate().map(|(address, (name, card))| Place {
                 area,
                 address: address as u16,
                 width: 1,
                 name,
-                meaning: meaning.into(),
+                meaning: described(meaning, &card),
                 writable: false,
+                of: "BOOL".into(),
+                card,
             }));
             if area == Area::Coil {
                 first_coil = places.len() - first;
@@ -177,8 +189,10 @@ impl RegisterMap {
                         address: (places.len() - first) as u16,
                         width: 1,
                         name: target.name,
-                        meaning: target.meaning.into(),
+                        meaning: described(&target.meaning, &target.card),
                         writable: true,
+                        of: "BOOL".into(),
+                        card: target.card,
                     });
                     coils.push(target.target);
                 }
@@ -195,6 +209,8 @@ impl RegisterMap {
             name,
             meaning: meaning.into(),
             writable: false,
+            of: if width == 1 { "UINT" } else { "UDINT" }.into(),
+            card: CardFacts::default(),
         };
         for (address, width, name, meaning) in OF_RUN {
             places.push(register(address.into(), width, name.to_owned(), meaning));
@@ -222,21 +238,30 @@ impl RegisterMap {
             targets(cluster, |of| of != Elementary::Bool)
                 .map(|target| (target.name.clone(), target))
                 .collect();
-        for (program, interface) in programs.iter().zip(&interfaces) {
+        for (of, (program, interface)) in (0..).map(ProgramId).zip(programs.iter().zip(&interfaces))
+        {
             for (points, meaning) in [(&interface.inputs, INPUT), (&interface.outputs, OUTPUT)] {
                 for point in points.iter().filter(|point| point.of != Elementary::Bool) {
                     let width = registers_of(point);
                     let name = format!("{}.{}", program.name, point.name);
                     let target = written.remove(&name);
                     let meaning = target.as_ref().map_or(meaning, |target| &target.meaning);
-                    let unit = if point.of.is_time() { " in nanoseconds" } else { "" };
+                    let card = cluster.card(of, &point.name).facts(point.of);
+                    let unit = match &card.unit {
+                        Some(unit) => format!(" in {unit}"),
+                        None if point.of.is_time() => " in nanoseconds".to_owned(),
+                        None => String::new(),
+                    };
+                    let meaning = format!("{}{unit}: {meaning}", type_of(point));
                     places.push(Place {
                         area: Area::Register,
                         address: address as u16,
                         width: width as u16,
                         name,
-                        meaning: format!("{}{unit}: {meaning}", type_of(point)).into(),
+                        meaning: described(&meaning, &card),
                         writable: target.is_some(),
+                        of: point.declared().to_string().into(),
+                        card,
                     });
                     if let Some(target) = target {
                         setpoints.insert(address, target.target);
@@ -309,6 +334,7 @@ impl RegisterMap {
 struct WritableInput {
     name: String,
     meaning: String,
+    card: CardFacts,
     target: Target,
 }
 
@@ -319,7 +345,8 @@ fn targets(
 ) -> impl Iterator<Item = WritableInput> {
     let programs = cluster.controllers().iter().zip(cluster.remote_ios());
     programs.enumerate().flat_map(move |(index, (controller, remote_io))| {
-        let member = Member::RemoteIo(ProgramId(index as u8));
+        let program = ProgramId(index as u8);
+        let member = Member::RemoteIo(program);
         let inputs = remote_io.inputs.iter();
         inputs.filter_map(move |source| {
             let declaration = source.operator()?;
@@ -327,10 +354,19 @@ fn targets(
             wanted(point.of).then(|| WritableInput {
                 name: format!("{}.{}", controller.name, source.name),
                 meaning: meaning_of(declaration),
+                card: cluster.card(program, &source.name).facts(point.of),
                 target: Target { member, point: point.clone(), width: registers_of(point) },
             })
         })
     })
+}
+
+/// What a place holds, with the description of its signal.
+fn described(meaning: &str, card: &CardFacts) -> Cow<'static, str> {
+    match &card.description {
+        Some(description) => format!("{meaning}; {description}").into(),
+        None => meaning.to_owned().into(),
+    }
 }
 
 /// Values of an enumeration that a meaning names.
@@ -354,9 +390,7 @@ fn meaning_of(declaration: &OperatorDeclaration) -> String {
         OperatorInputKind::Pulse(_) => format!("pulse: TRUE presses it, by the role {role}"),
         OperatorInputKind::Setpoint { low, high } => {
             let text = |stored| value_text(&declaration.declared, stored);
-            let unit = declaration.unit.as_deref().unwrap_or_default();
-            let range = format!("{} to {} {unit}", text(low), text(high));
-            format!("setpoint, {}, written by the role {role}", range.trim_end())
+            format!("setpoint, {} to {}, written by the role {role}", text(low), text(high))
         }
         OperatorInputKind::Group { .. } => {
             format!("signal of another group, written by the role {role}")

@@ -1,6 +1,6 @@
 //! The members of a cluster by name.
 
-use understudy_cluster::{Cluster, InputSource};
+use understudy_cluster::{Card, Cluster, InputSource};
 use understudy_remote_io::OperatorInput;
 use understudy_typed::{Declared, Point};
 use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, StationId, StationSet};
@@ -28,8 +28,8 @@ pub struct NamedSignal {
     pub name: String,
     /// How the program declares it.
     pub declared: Declared,
-    /// Unit of a setpoint.
-    pub unit: Option<String>,
+    /// How it is shown.
+    pub card: Card,
     /// The output of another program that it is, such as `press.done`.
     pub from: Option<String>,
 }
@@ -67,7 +67,7 @@ impl Members {
         Self {
             operator_inputs: inputs.collect(),
             signals: (0..cluster.controllers().len())
-                .map(|program| signals(cluster, program))
+                .map(|program| signals(cluster, ProgramId(program as u8)))
                 .collect(),
             spare_slots: cluster.agreement().schedule.spare_slots(),
             have_two_networks: cluster.has_two_networks(),
@@ -173,7 +173,8 @@ impl Members {
 }
 
 /// Inputs and outputs of a program of the cluster.
-fn signals(cluster: &Cluster, program: usize) -> Vec<NamedSignal> {
+fn signals(cluster: &Cluster, of: ProgramId) -> Vec<NamedSignal> {
+    let program = of.index();
     let interface = &cluster.controllers()[program].interface;
     let sources = cluster.remote_ios().get(program);
     let sources = sources.map_or(&[][..], |remote_io| &remote_io.inputs);
@@ -187,7 +188,7 @@ fn signals(cluster: &Cluster, program: usize) -> Vec<NamedSignal> {
             place,
             name: point.name.clone(),
             declared: point.declared(),
-            unit: source.and_then(|source| source.operator()?.unit.clone()),
+            card: cluster.card(of, &point.name),
             from: signal.map(|signal| {
                 let from = &cluster.controllers()[signal.input.from.index()].name;
                 format!("{from}.{}", signal.output)

@@ -21,6 +21,7 @@ use opcua::types::{
 };
 use tokio::net::TcpListener;
 use understudy_bus::{Connections, Listener, relay};
+use understudy_cluster::CardFacts;
 use understudy_gateway::{Feed, Followed, WriteGate, serve_until_asked};
 use understudy_view::{Event, Level, Run};
 use understudy_wire::Role;
@@ -28,7 +29,7 @@ use understudy_wire::Role;
 use crate::error::OpcuaError;
 use crate::manager::{NodeManager, Writing, node_manager};
 use crate::security::{Login, Settings, certificate_and_key};
-use crate::tree::{Kind, Reading, Seen, Variable, WritableInput, message, variables};
+use crate::tree::{Kind, Reading, Seen, Variable, message, variables};
 use crate::trust;
 
 /// Between two looks at what is newest; a run is followed no faster.
@@ -245,11 +246,12 @@ fn add_nodes(
         let name = variable.name();
         let node = NodeId::new(index, variable.path());
         let rank = if kind == Kind::Strings { 1 } else { -1 };
-        let limits = variable.writable().and_then(|input| input.limits);
-        let type_of = match limits {
+        let card = variable.card();
+        let type_of = match (card.low.zip(card.high), &card.unit) {
             _ if !variable.names().is_empty() => VariableTypeId::MultiStateDiscreteType,
-            Some(_) => VariableTypeId::AnalogItemType,
-            None => VariableTypeId::BaseDataVariableType,
+            (Some(_), _) => VariableTypeId::AnalogItemType,
+            (None, Some(_)) => VariableTypeId::AnalogUnitType,
+            (None, None) => VariableTypeId::BaseDataVariableType,
         };
         let builder = VariableBuilder::new(&node, QualifiedName::new(index, name), name)
             .description(variable.meaning())
@@ -263,9 +265,7 @@ fn add_nodes(
             false => builder,
         };
         builder.insert(space);
-        if let Some(input) = variable.writable() {
-            add_properties(space, index, &variable.path(), input);
-        }
+        add_properties(space, index, &variable.path(), card);
         if !variable.names().is_empty() {
             let names = variable.names().iter().map(|name| name.as_str().into());
             let names: Vec<LocalizedText> = names.collect();
@@ -281,8 +281,8 @@ fn add_nodes(
     }
 }
 
-/// Range and unit of a setpoint.
-fn add_properties(space: &mut AddressSpace, index: u16, path: &str, input: &WritableInput) {
+/// Range and unit of a signal.
+fn add_properties(space: &mut AddressSpace, index: u16, path: &str, card: &CardFacts) {
     let mut add = |name: &str, of: DataTypeId, value: ExtensionObject| {
         let property = NodeId::new(index, format!("{path}/{name}"));
         VariableBuilder::new(&property, QualifiedName::new(0, name), name)
@@ -292,11 +292,11 @@ fn add_properties(space: &mut AddressSpace, index: u16, path: &str, input: &Writ
             .property_of(NodeId::new(index, path))
             .insert(space);
     };
-    if let Some((low, high)) = input.limits {
+    if let Some((low, high)) = card.low.zip(card.high) {
         let range = ExtensionObject::from_message(Range { low, high });
         add("EURange", DataTypeId::Range, range);
     }
-    if let Some(unit) = &input.unit {
+    if let Some(unit) = &card.unit {
         // Without a code of UNECE the name is the unit.
         let unit = EUInformation {
             unit_id: -1,

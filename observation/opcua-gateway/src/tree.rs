@@ -13,13 +13,15 @@
 mod alarms;
 mod signals;
 
+use std::borrow::Cow;
+
 use opcua::types::{DataTypeId, StatusCode, UAString, Variant};
-use understudy_cluster::{Cluster, Controller, InputSource};
+use understudy_cluster::{CardFacts, Cluster, Controller};
 use understudy_gateway::{Feed, Observation};
 use understudy_journal::TimeOfDay;
 use understudy_typed::Point;
 use understudy_view::{Event, ImageSide, ProgramSnapshot, StationSnapshot};
-use understudy_wire::{Member, ProgramId};
+use understudy_wire::{Image, Member, ProgramId};
 
 use crate::trust;
 
@@ -82,6 +84,13 @@ impl Seen<'_> {
         self.observation.snapshot.stored(program, side, point)
     }
 
+    /// A value in the state of a program before its last sample.
+    fn in_state(&self, place: usize, read: impl Fn(&Image) -> Option<Variant>) -> Reading {
+        let state = self.observation.states.get(place).and_then(Option::as_ref);
+        let own = self.program(place).map(trust::state);
+        self.present(state.and_then(read), own.unwrap_or_default())
+    }
+
     fn station(&self, rank: usize) -> Option<&StationSnapshot> {
         self.observation.snapshot.stations.get(rank)
     }
@@ -133,10 +142,6 @@ pub(crate) struct WritableInput {
     pub(crate) member: Member,
     /// The input.
     pub(crate) point: Point,
-    /// Lowest and highest value of a setpoint.
-    pub(crate) limits: Option<(f64, f64)>,
-    /// Unit of a setpoint.
-    pub(crate) unit: Option<String>,
 }
 
 type Read = Box<dyn Fn(&Seen<'_>) -> Reading + Send + Sync>;
@@ -146,7 +151,9 @@ pub struct Variable {
     folders: Vec<String>,
     name: String,
     kind: Kind,
-    meaning: &'static str,
+    meaning: Cow<'static, str>,
+    /// How a signal is shown.
+    card: CardFacts,
     writable: Option<WritableInput>,
     /// The names of the values of an enumeration, by number from 0; empty for a number without a name.
     names: Vec<String>,
@@ -175,8 +182,13 @@ impl Variable {
     }
 
     /// Its meaning.
-    pub fn meaning(&self) -> &'static str {
-        self.meaning
+    pub fn meaning(&self) -> &str {
+        &self.meaning
+    }
+
+    /// How a signal is shown; nothing of any other variable.
+    pub fn card(&self) -> &CardFacts {
+        &self.card
     }
 
     /// Whether it is an operator input.
@@ -218,7 +230,9 @@ pub fn variables(cluster: &Cluster) -> Vec<Variable> {
     }
     let programs = cluster.controllers().iter().zip(cluster.remote_ios());
     for (place, (controller, remote_io)) in programs.enumerate() {
-        tree.program(place, controller, &remote_io.inputs);
+        tree.program(place, controller);
+        let card = |name: &str| cluster.card(ProgramId(place as u8), name);
+        tree.signals(place, controller, &remote_io.inputs, card);
     }
     tree.variables
 }
@@ -251,7 +265,8 @@ impl Tree {
             folders: self.folders.clone(),
             name: name.to_owned(),
             kind,
-            meaning,
+            meaning: meaning.into(),
+            card: CardFacts::default(),
             writable: None,
             names: Vec::new(),
             read: Box::new(read),
@@ -316,7 +331,7 @@ impl Tree {
         }
     }
 
-    fn program(&mut self, place: usize, controller: &Controller, sources: &[InputSource]) {
+    fn program(&mut self, place: usize, controller: &Controller) {
         let name = controller.name.as_str();
         self.enter(&["Programs", name]);
         let of = move |read: fn(&ProgramSnapshot) -> Option<Variant>| {
@@ -359,7 +374,6 @@ impl Tree {
             "Finished" UInt64 "finished parts of a simulated plant" => count(|of| of.finished);
             "PlantFaults" UInt64 "plant faults of a simulated plant" => count(|of| of.plant_faults);
         }
-        self.signals(place, controller, sources);
     }
 }
 

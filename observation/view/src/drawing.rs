@@ -11,12 +11,14 @@ use understudy_diagram::chart::Chart;
 use understudy_interchange::DrawnBody;
 use understudy_text::Lines;
 use understudy_typed::{
-    Comparison, Done, Effect, Elementary, Made, Operation, Program, RealFunction, Trace,
+    Comparison, Declared, Done, Effect, Elementary, Made, Operation, Program, RealFunction, Trace,
 };
 use understudy_wire::ProgramId;
 
 use crate::error::ViewError;
 use crate::model::Model;
+use crate::shown_text::ShownLine;
+use crate::value::value_text;
 
 impl Model {
     /// The programs of a controller with numbers as SVG, with the values of a cycle; without values where the state is not known, which the second
@@ -42,21 +44,27 @@ impl Model {
         for unit in units.iter().filter(|unit| unit.is_program) {
             let mut unit = unit.clone();
             let scan = trace.as_ref().map(|trace| Scan::new(typed, trace, &unit.name));
-            if let Some(scan) = scan {
+            let mut about = String::new();
+            if let Some(scan) = &scan {
                 match &mut unit.body {
                     DrawnBody::Networks(networks) => {
                         let mut networks = networks.iter_mut();
                         networks.by_ref().for_each(|it| scan.network(it, &lines));
                     }
-                    DrawnBody::Chart(chart) => scan.chart(chart),
-                    DrawnBody::Text(..) => {}
+                    DrawnBody::Chart(chart) => about = scan.chart(chart),
+                    DrawnBody::Text(text, _) => {
+                        let shown = self.text_at(program, cycle);
+                        let shown = shown.map(|(lines, _)| scan.body(&lines));
+                        *text = shown.filter(|it| !it.is_empty()).unwrap_or_else(|| text.clone());
+                    }
                 }
             }
             picture.heading(&unit.heading);
             if let DrawnBody::Text(_, Some(reason)) = &unit.body {
-                picture.note(&format!("not drawn: it has {reason}"));
+                picture.note(&format!("as text, since it has {reason}"));
             }
             unit.paint_body(&mut picture);
+            picture.note(&about);
         }
         Some((picture.svg(&typed.name), error))
     }
@@ -92,7 +100,9 @@ impl<'t> Scan<'t> {
 
     /// A variable at the end of the scan.
     fn after(&self, name: &str) -> Option<String> {
-        self.part(name)?.text(&self.trace.memory)
+        let part = self.part(name)?;
+        let (_, stored) = part.stored(&self.trace.memory)?;
+        Some(drawn(&part.declared()?, stored))
     }
 
     fn network(&self, network: &mut Network, lines: &Lines) {
@@ -149,7 +159,7 @@ impl<'t> Scan<'t> {
         let part = self.part(name)?;
         let mut reads = done.iter().flat_map(|done| &done.reads);
         match reads.find(|read| read.address == part.address) {
-            Some(read) => Some(part.declared()?.text(read.value)),
+            Some(read) => Some(drawn(&part.declared()?, read.value)),
             None => self.after(name),
         }
     }
@@ -178,13 +188,115 @@ impl<'t> Scan<'t> {
         }
     }
 
-    fn chart(&self, chart: &mut Chart) {
+    /// Marks the active steps and what the conditions of transitions came to; the times of the active steps and the values that these conditions read,
+    /// line by line.
+    fn chart(&self, chart: &mut Chart) -> String {
+        let mut about = String::new();
         for step in &mut chart.steps {
             let part = self.part(&format!("{}.X", step.name));
             let stored = part.and_then(|part| part.stored(&self.trace.memory));
             step.active = stored.map(|(_, value)| value != 0);
+            if let (Some(true), Some(time)) = (step.active, self.after(&format!("{}.T", step.name)))
+            {
+                about += &format!("step {}: active for {}\n", step.name, time.replace("T#", ""));
+            }
         }
+        let mut known: BTreeMap<String, usize> = BTreeMap::new();
+        for transition in &mut chart.transitions {
+            let steps = |places: &[usize]| {
+                let names = places.iter().map(|place| chart.steps[*place].name.as_str());
+                names.collect::<Vec<_>>().join("+")
+            };
+            let (from, to) = (steps(&transition.from), steps(&transition.to));
+            let fires = format!("fires.{from}.{to}");
+            let number = known.entry(fires.to_lowercase()).or_insert(0);
+            *number += 1;
+            let fires = if *number > 1 { format!("{fires}.{number}") } else { fires };
+            let Some((truth, values)) = self.transition(&fires, transition.from.len()) else {
+                continue;
+            };
+            transition.truth = Some(truth);
+            let truth = if truth { "TRUE" } else { "FALSE" };
+            let condition = &transition.condition;
+            about += &format!("transition {from} to {to}: {condition} is {truth}{values}\n");
+        }
+        about
     }
+
+    /// What the condition of a transition came to, and the values that it read; nothing where a step before it was not active, or one of higher priority
+    /// fired. The statement is `fires := step.X AND NOT other AND_THEN condition`, with `steps` steps.
+    fn transition(&self, fires: &str, steps: usize) -> Option<(bool, String)> {
+        let is_named = |known: &str| {
+            let own = known.strip_prefix(self.unit).and_then(|name| name.strip_prefix('.'));
+            own.unwrap_or(known).eq_ignore_ascii_case(fires)
+        };
+        let mut hidden = self.typed.hidden.iter();
+        let address = 64 * u64::from(hidden.find(|known| is_named(&known.name))?.slot);
+        let is_it = |done: &&Done| matches!(done.effect, Effect::Assigned { address: at, .. } if at == address);
+        let done = self.trace.done.iter().find(is_it)?;
+        let Effect::Assigned { value: Some((_, truth)), .. } = done.effect else {
+            return None;
+        };
+        let mut values = Vec::new();
+        let mut is_before = true;
+        for (place, read) in done.reads.iter().enumerate() {
+            let mut hidden = self.typed.hidden.iter();
+            let is_other = hidden.any(|known| 64 * u64::from(known.slot) == read.address);
+            is_before &= place < steps || is_other;
+            if is_before && read.value != u64::from(!is_other) {
+                return None;
+            }
+            let part = self.typed.part_at(read.address).filter(|_| !is_before);
+            if let Some((declared, name)) = part.and_then(|it| Some((it.declared()?, it.name))) {
+                let own = name.strip_prefix(self.unit).and_then(|name| name.strip_prefix('.'));
+                let name = own.unwrap_or(&name);
+                values.push(format!("{name} = {}", drawn(&declared, read.value)));
+            }
+        }
+        let values =
+            if values.is_empty() { String::new() } else { format!(", {}", values.join(", ")) };
+        Some((truth != 0, values))
+    }
+
+    /// The statements of the program as they are written, those that were executed marked, with the values after the scan.
+    fn body(&self, lines: &[ShownLine]) -> String {
+        let is_word = |line: &ShownLine, word: &str| {
+            let mut words =
+                line.text.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+            words.any(|own| own.eq_ignore_ascii_case(word))
+        };
+        let begins = |line: &ShownLine| {
+            let mut words = line.text.split_whitespace();
+            let [first, second] = [(); 2].map(|()| words.next().unwrap_or_default());
+            first.eq_ignore_ascii_case("PROGRAM") && second.eq_ignore_ascii_case(self.unit)
+        };
+        let own = lines.iter().skip_while(|line| !begins(line)).skip(1);
+        let own: Vec<&ShownLine> = own.take_while(|line| !is_word(line, "END_PROGRAM")).collect();
+        let declared = own.iter().rposition(|line| is_word(line, "END_VAR"));
+        let own = &own[declared.map_or(0, |last| last + 1)..];
+        let width = own.iter().map(|line| line.text.chars().count()).max().unwrap_or(0);
+        let shown = own.iter().map(|line| {
+            let values = line.values.iter().map(|value| {
+                let text = self.after(&value.name);
+                let text = text.unwrap_or_else(|| value_text(&value.value));
+                format!("{} = {text}", value.name)
+            });
+            let mark = if line.executed { "▸" } else { " " };
+            let values = values.collect::<Vec<_>>().join(", ");
+            format!("{mark} {:width$}   {values}", line.text).trim_end().to_owned() + "\n"
+        });
+        shown.collect()
+    }
+}
+
+/// A value as a drawing shows it: a real with at most seven digits, which fit next to a box.
+fn drawn(declared: &Declared, stored: u64) -> String {
+    let number = declared.of.number(stored);
+    if declared.of.is_real() && number.is_finite() {
+        let rounded: f64 = format!("{number:.6e}").parse().unwrap_or(number);
+        return format!("{rounded:?}");
+    }
+    declared.text(stored)
 }
 
 /// The one assignment of an address, with its value.
@@ -219,12 +331,12 @@ fn fill(
     for (at, made) in matched(network, object, &done.results).unwrap_or_default() {
         let outputs = &mut network.objects[at].outputs;
         if let Some(output) = outputs.iter_mut().find(|output| output.name == "OUT") {
-            output.value = Some(made.of.text(made.value));
+            output.value = Some(drawn(&made.of.into(), made.value));
         }
     }
     // The last one is what was assigned.
     if !negated {
-        network.objects[object].outputs[output].value = Some(of.text(value));
+        network.objects[object].outputs[output].value = Some(drawn(&of.into(), value));
     }
 }
 

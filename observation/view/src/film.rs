@@ -4,6 +4,7 @@
 
 mod picture;
 
+use understudy_cluster::Card;
 use understudy_typed::{Elementary, Point};
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
@@ -12,7 +13,7 @@ use crate::history::History;
 use crate::model::Model;
 use crate::station::StationState;
 use crate::timeline::Span;
-use crate::value::{is_declared, stored_text};
+use crate::value::{card_text, is_declared};
 
 /// Cycles of one film, at most.
 const MAXIMUM_CYCLES: i64 = 2_000;
@@ -234,7 +235,8 @@ impl Model {
             let values = joined(images.spans(output, from, to));
             // A program fault that never was is not worth a trace.
             let is_shown = is_declared(&output.name) || values.iter().any(|it| it.value != 0);
-            is_shown.then(|| levels(output, values))
+            let card = self.card(program, &output.name, to.saturating_sub(1));
+            is_shown.then(|| levels(output, &card, values))
         });
         let mut filmed: Vec<Output> = filmed.collect();
         let further = filmed.len().saturating_sub(MAXIMUM_OUTPUTS);
@@ -270,7 +272,7 @@ impl Model {
 }
 
 /// The stored values of an output as they are drawn.
-fn levels(output: &Point, values: Vec<Span<u64>>) -> Output {
+fn levels(output: &Point, card: &Card, values: Vec<Span<u64>>) -> Output {
     let is_bool = output.of == Elementary::Bool;
     let declared = output.declared();
     let number = |stored: u64| output.of.number(stored);
@@ -287,10 +289,10 @@ fn levels(output: &Point, values: Vec<Span<u64>>) -> Output {
         let share = (number(stored) / 2.0 - least / 2.0) / (most / 2.0 - least / 2.0);
         Level {
             share: if share.is_finite() { share } else { 0.0 },
-            text: (!is_bool).then(|| stored_text(&declared, stored)),
+            text: (!is_bool).then(|| card_text(card, &declared, stored)),
         }
     };
-    let text = |stored| stored_text(&declared, stored);
+    let text = |stored| card_text(card, &declared, stored);
     let spans = values.into_iter();
     let spans = spans.map(|span| Span { from: span.from, to: span.to, value: level(span.value) });
     Output {

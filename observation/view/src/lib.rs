@@ -77,7 +77,7 @@ pub use snapshot::{
     SpareSnapshot, StationSnapshot, TimingSnapshot, TwinSnapshot, WordSnapshot,
 };
 pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
-pub use state_signal::StateSignal;
+pub use state_signal::{StateSignal, state_signals_of};
 pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};

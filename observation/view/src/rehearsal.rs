@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_cluster::Card;
 use understudy_cycle::{PointPlace, ProgramChange};
 use understudy_executable::{Scratch, declared};
 use understudy_typed::{Point, Points};
@@ -197,7 +198,7 @@ impl Rehearsal {
             self.found.first = Some(FirstDifference {
                 cycle,
                 scans,
-                inputs: named_text(&self.inputs, &sampled.inputs),
+                inputs: named_text(&self.inputs, &sampled.inputs, |_| Card::default()),
                 before: text(&sampled.outputs),
                 now: text(outputs),
             });

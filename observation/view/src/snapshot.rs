@@ -367,9 +367,9 @@ pub struct ProgramSnapshot {
     pub awaits_release: bool,
     /// Signals that are forced, in words.
     pub forced: Vec<String>,
-    /// Signals that are forced.
+    /// Signals that are forced, each with the cycle since which it is.
     #[serde(skip)]
-    pub forces: Vec<Force>,
+    pub forces: Vec<(Force, i64)>,
     /// Whether signals of other programs are valid in this sample, by the first bit of their inputs; those that its remote I/O has reported.
     #[serde(skip)]
     pub validity: BTreeMap<u16, bool>,

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 use understudy_cluster::Controller;
-use understudy_typed::{Enumeration, Part};
+use understudy_typed::{Elementary, Enumeration, Part};
 use understudy_wire::{ProgramHash, ProgramId};
 
 use crate::error::ViewError;
@@ -38,7 +38,7 @@ impl Model {
     /// The signals in the state of the program that runs; nothing where the cluster has no such program.
     pub fn state_signals(&self, program: ProgramId) -> Vec<StateSignal> {
         let version = self.running_version(program);
-        version.map_or_else(Vec::new, |version| of_controller(version.controller()))
+        version.map_or_else(Vec::new, |version| state_signals_of(version.controller()))
     }
 
     /// The values of signals in the state of a program after the scan of a cycle; null where an online change had another program there, without a signal
@@ -154,13 +154,23 @@ impl StateSignal {
         }
     }
 
+    /// Its type; nothing where it has parts.
+    pub fn elementary(&self) -> Option<Elementary> {
+        self.part.of.elementary()
+    }
+
+    /// Its stored value in a state of its program, in the order of its variables.
+    pub fn stored(&self, state: &[u64]) -> Option<u64> {
+        self.part.stored(state).map(|(_, stored)| stored)
+    }
+
     fn in_state(&self, state: &[u64]) -> Value {
         self.part.stored(state).map_or(Value::Null, |(of, stored)| number(of, stored))
     }
 }
 
 /// The signals in the state of the program of a controller: all that has a value of its own and is no input and no output.
-pub(crate) fn of_controller(controller: &Controller) -> Vec<StateSignal> {
+pub fn state_signals_of(controller: &Controller) -> Vec<StateSignal> {
     let typed = controller.code.typed();
     let interface = &controller.interface;
     let points = interface.inputs.iter().chain(interface.outputs.iter());

@@ -1,7 +1,7 @@
 //! The value of a point in an image that is written as bits, `0110`.
 
 use serde_json::Value;
-use understudy_cluster::Controller;
+use understudy_cluster::{Card, Controller};
 use understudy_typed::{Declared, Elementary, Point, Points, Program};
 use understudy_wire::{Force, Image, SignalPlace};
 
@@ -52,11 +52,17 @@ pub(crate) fn stored_text(declared: &Declared, stored: u64) -> String {
     value_text(&shown(declared, stored))
 }
 
-/// The values of the declared points of an image as people read them: `level = 2.5, run = 1`.
-pub(crate) fn named_text(points: &Points, image: &Image) -> String {
+/// A stored value as a scale shows it: with the decimals and the unit of its card.
+pub(crate) fn card_text(card: &Card, declared: &Declared, stored: u64) -> String {
+    let rounded = card.rounded(declared, stored);
+    card.with_unit(rounded.unwrap_or_else(|| stored_text(declared, stored)))
+}
+
+/// The values of the declared points of an image as people read them, with all digits: `level = 2.5 m, run = 1`.
+pub(crate) fn named_text(points: &Points, image: &Image, card: impl Fn(&str) -> Card) -> String {
     let points = points.iter().filter(|point| is_declared(&point.name));
     let texts = points.map(|point| {
-        let text = point_text(point, image);
+        let text = card(&point.name).with_unit(point_text(point, image));
         format!("{} = {text}", point.name)
     });
     texts.collect::<Vec<String>>().join(", ")

@@ -81,7 +81,7 @@ impl Version {
             return Some(of);
         }
         let signals = self.signals.get_or_init(|| {
-            let signals = state_signal::of_controller(&self.controller).into_iter();
+            let signals = state_signal::state_signals_of(&self.controller).into_iter();
             signals.map(|signal| (signal.name.clone(), signal)).collect()
         });
         signals.get(&of.name).filter(|own| own.of == of.of)

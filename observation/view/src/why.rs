@@ -73,6 +73,9 @@ pub struct Why {
     )]
     #[schemars(with = "Option<String>")]
     pub of: Option<Declared>,
+    /// Unit of the values, of an input or output that has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
     /// How it was reconstructed.
     pub reconstructed: Option<Reconstructed>,
     /// Configured fail-safe value, where the output is on a ramp to it.
@@ -156,6 +159,9 @@ pub struct Reason {
     )]
     #[schemars(with = "Option<String>")]
     pub of: Option<Declared>,
+    /// Unit of the value, of an input or output that has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
     /// From the origin of the run.
     pub cycle: i64,
     /// Time of day of the cycle.
@@ -180,6 +186,11 @@ impl Reason {
         self.at = times.of_cycle(self.cycle);
         self.because.iter_mut().for_each(|reason| reason.is_timed(times));
     }
+
+    fn has_units(&mut self, unit: &impl Fn(&str) -> Option<String>) {
+        self.unit = unit(&self.signal);
+        self.because.iter_mut().for_each(|reason| reason.has_units(unit));
+    }
 }
 
 impl Model {
@@ -201,8 +212,11 @@ impl Model {
         let place = place.ok_or_else(|| self.no_cycle(program, cycle.unwrap_or(0)))?;
         let mut why = self.why_at(program, history, &name, place)?;
         why.at = self.times.of_cycle(why.cycle);
+        let points = self.points_in(Some(why.cycle));
+        why.unit = points.cluster().card(program, &why.signal).unit;
         if let Some(reason) = &mut why.because {
             reason.is_timed(&self.times);
+            reason.has_units(&|name| points.cluster().card(program, name).unit);
         }
         if cycle.is_none() {
             let newest = self.newest();
@@ -290,6 +304,8 @@ impl Model {
             sampled.clone().flat_map(|it| value::named(&controller.interface.inputs, &it.inputs));
         let has_numbers = has_numbers(controller);
         let mut sampled = sampled.filter(|_| has_numbers);
+        let points = self.points_in(Some(step.cycle));
+        let card = |name: &str| points.cluster().card(program, name);
         Ok(Why {
             at: None,
             signal: name.to_owned(),
@@ -305,11 +321,12 @@ impl Model {
             inputs: inputs.collect(),
             inputs_text: sampled
                 .next()
-                .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
+                .map(|it| named_text(&controller.interface.inputs, &it.inputs, card)),
             of: match output {
                 Some(output) => Some(output.declared()),
                 None => typed.part(name).and_then(|part| part.declared()),
             },
+            unit: None,
             ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: decided.and_then(|driven| self.reconstructed(program, step, driven)),
@@ -417,9 +434,11 @@ impl Model {
             let controller = named_by(program, image).into_iter();
             controller.flat_map(|it| value::named(&it.interface.outputs, image)).collect()
         };
+        let points = self.points_in(Some(step.cycle));
         let values_text = |program: ProgramId, image: &Image| {
             let controller = named_by(program, image).filter(|it| has_numbers(it))?;
-            Some(named_text(&controller.interface.outputs, image))
+            let card = |name: &str| points.cluster().card(program, name);
+            Some(named_text(&controller.interface.outputs, image, card))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;

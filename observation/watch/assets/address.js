@@ -29,7 +29,7 @@ export function wanted() {
 export function addressOf(view, selection = {}) {
   const keys = new URLSearchParams(Object.entries(selection).filter(([, value]) => value !== "" && value !== null && value !== undefined));
   // Commas and slashes stay readable.
-  const query = keys.toString().replaceAll("%2C", ",").replaceAll("%2F", "/").replaceAll("%40", "@");
+  const query = keys.toString().replaceAll("%2C", ",").replaceAll("%2F", "/").replaceAll("%40", "@").replaceAll("%3A", ":");
   return `#${view}${query ? `?${query}` : ""}`;
 }
 

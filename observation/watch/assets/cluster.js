@@ -6,6 +6,7 @@ import { signalLegend, sourceLegend, stateLegend } from "/legend.js";
 import * as overview from "/overview.js";
 import { STATES, makePicture } from "/picture.js";
 import { continueWords, openChoice, openMember } from "/commands.js";
+import { textOf } from "/signals.js";
 import { SOURCES } from "/sources.js";
 import * as time from "/time.js";
 import { openWhy } from "/why.js";
@@ -215,7 +216,7 @@ function signals(programs) {
       const facts = run.programs[program.index];
       const line = (signal, kind, index) =>
         el("button", { type: "button", class: "signal", "data-kind": kind, "data-index": index, click: () => pick(program.index, kind, index) },
-          el("span", { class: "lamp", "aria-hidden": "true" }), el("span", { class: "signal-name" }, broken(signal.name)), el("span", { class: "signal-value" }), el("span", { class: "signal-forced" }));
+          el("span", { class: signal.type === "BOOL" ? "lamp" : "lamp-room", "aria-hidden": "true" }), el("span", { class: "signal-name", title: signal.description }, broken(signal.name)), el("span", { class: "signal-value" }), el("span", { class: "signal-forced" }));
       return el("details", { open: !large, "data-program": program.name },
         el("summary", {}, program.name, " ", el("span", { class: "source-words" })),
         el("div", { class: "signal-columns" },
@@ -229,10 +230,11 @@ function signals(programs) {
         const { kind, index } = button.dataset;
         const values = kind === "input" ? program.input_values : program.output_values;
         const forced = program.forced.find((force) => force.kind === kind && String(force.index) === index);
-        const { type } = run.programs[program.index][`${kind}s`][index];
-        const value = valueText(forced && kind === "output" ? forced.value : values?.[index], type);
-        setText(button.querySelector(".signal-value"), value);
-        setText(button.querySelector(".signal-forced"), forced ? `forced by ${forced.owner}` : "");
+        const signal = run.programs[program.index][`${kind}s`][index];
+        const shown = forced && kind === "output" ? forced.value : values?.[index];
+        const value = valueText(shown, signal.type);
+        setText(button.querySelector(".signal-value"), textOf(signal, shown));
+        setText(button.querySelector(".signal-forced"), forced ? `forced by ${forced.owner}, ${forced.left_s} s left` : "");
         setAttribute(button, "data-value", value);
       }
     },

@@ -179,14 +179,14 @@ function forcing(member, signal, because, give) {
     const { point } = chosen();
     number.hidden = point.type === "BOOL";
     bit.hidden = !number.hidden;
-    setText(type, number.hidden ? "" : `${point.type}${point.operator?.unit ? `, ${point.operator.unit}` : ""}${point.type === "TIME" ? ", such as 1.5s" : ""}${point.values ? `: ${Object.values(point.values).join(", ")}` : ""}`);
+    setText(type, number.hidden ? "" : `${point.type}${point.unit ? `, ${point.unit}` : ""}${point.type === "TIME" ? ", such as 1.5s" : ""}${point.values ? `: ${Object.values(point.values).join(", ")}` : ""}`);
     force.disabled = Boolean(down) || (!number.hidden && number.value.trim() === "");
   };
   fit();
   const forces = state().programs[member.program].forced;
   const nameOf = (held) => facts[`${held.kind}s`][held.index]?.name ?? `at bit ${held.bit}`;
   const held = forces.map((force) =>
-    el("li", {}, `${force.kind} ${nameOf(force)} = ${valueText(force.value, facts[`${force.kind}s`][force.index]?.type)}, by ${force.owner}: ${force.reason} `,
+    el("li", {}, `${force.kind} ${nameOf(force)} = ${valueText(force.value, facts[`${force.kind}s`][force.index]?.type)}, by ${force.owner}, ${force.left_s} s left: ${force.reason} `,
       el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.bit } }, `force of ${force.kind} ${nameOf(force)} taken back`) }, "Take back")));
   return el("fieldset", {},
     el("legend", {}, "Force a signal"),

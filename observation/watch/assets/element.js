@@ -89,8 +89,11 @@ function durationText(nanoseconds) {
   return `${nanoseconds < 0 ? "-" : ""}${text || "0ms"}`;
 }
 
-// A value as people read it: a BOOL as 0 or 1, a number with at most seven digits.
-export function valueText(value, type) {
+// A number with its decimals; one that rounds to 0 has no sign.
+const rounded = (value, decimals) => value.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1");
+
+// A value as people read it: a BOOL as 0 or 1, a number with the decimals of its card, or with at most seven digits.
+export function valueText(value, type, decimals) {
   if (TIMES.has(type) && typeof value === "number") {
     return durationText(value);
   }
@@ -98,7 +101,7 @@ export function valueText(value, type) {
     return value ? "1" : "0";
   }
   if (typeof value === "number") {
-    return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(7)));
+    return decimals !== undefined ? rounded(value, decimals) : Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(7)));
   }
   return value === null || value === undefined ? "?" : String(value);
 }

@@ -366,7 +366,7 @@ async function cross() {
   const row = (signal) =>
     el("tr", {},
       el("th", { scope: "row" }, el("button", { class: "link", type: "button", click: () => look(signal.name) }, signal.name)),
-      el("td", {}, signal.address ?? ""), el("td", {}, rungs(signal.written)), el("td", {}, rungs(signal.read)), el("td", { class: "soft" }, signal.comment ?? ""));
+      el("td", {}, signal.address ?? ""), el("td", {}, rungs(signal.written)), el("td", {}, rungs(signal.read)), el("td", { class: "soft" }, signal.description ?? ""));
   const head = ["signal", "address", `written in ${answer.place}`, `read in ${answer.place}`, "meaning"];
   place.replaceChildren(el("h2", {}, "Cross-reference"),
     el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Cross-reference table" },

@@ -79,8 +79,8 @@ function makePanel(program) {
 const isTime = (input) => input.type === "TIME";
 // A time is typed in milliseconds; the process image has nanoseconds.
 const scale = (input) => (isTime(input) ? 1e6 : 1);
-const unitOf = (input) => input.operator.unit ?? (isTime(input) ? "ms" : "");
-const numberText = (input, value) => valueText(typeof value === "number" ? value / scale(input) : value);
+const unitOf = (input) => input.unit ?? (isTime(input) ? "ms" : "");
+const numberText = (input, value, decimals) => valueText(typeof value === "number" ? value / scale(input) : value, undefined, decimals);
 const withUnit = (input, text) => `${text} ${unitOf(input)}`.trim();
 // The value of a request as it is shown.
 const wordsOf = (input, text) => (input.type === "BOOL" ? (text === "true" ? "1" : "0") : withUnit(input, text.replace(/ms$/, "")));
@@ -145,7 +145,7 @@ function makeControl(program, input, index) {
   };
   const setter = (kind === "pulse" ? makePulse : kind === "level" ? makeLevel : input.values ? makeChoice : MOMENTS.includes(input.type) ? makeMoment : makeSetpoint)(parts, write, say);
   const refresh = () => {
-    const shown = kind === "setpoint" ? withUnit(input, numberText(input, parts.sampled)) : valueText(parts.sampled);
+    const shown = kind === "setpoint" ? withUnit(input, numberText(input, parts.sampled, input.decimals)) : valueText(parts.sampled);
     setText(value, `${shown}${parts.busy ? " …" : ""}`);
     if (lamp) {
       setAttribute(lamp, "data-on", valueText(parts.sampled));
@@ -173,7 +173,7 @@ function makeControl(program, input, index) {
     setText(why, own ? `cannot be written: ${own}` : "");
     for (const target of setter.targets) {
       setAttribute(target, "aria-describedby", [described ?? (own ? why.id : null), answer.id].filter(Boolean).join(" "));
-      setAttribute(target, "title", parts.obstacle ? `cannot be written: ${parts.obstacle}` : input.comment ?? "");
+      setAttribute(target, "title", parts.obstacle ? `cannot be written: ${parts.obstacle}` : input.description ?? "");
     }
     refresh();
   };

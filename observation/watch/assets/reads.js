@@ -1,6 +1,7 @@
 // Who reads whom: a column for each program, and an arrow for each signal from the program that computes it to the one that reads it.
 
-import { el, setAttribute, setText, shorten, svg, valueText } from "/element.js";
+import { el, setAttribute, setText, shorten, svg } from "/element.js";
+import { textOf } from "/signals.js";
 
 // Two programs fit on a telephone.
 const WIDTH = 110;
@@ -36,7 +37,7 @@ export function makeReads(run) {
   const show = (state) => signals.forEach((signal, row) => {
     const own = state.programs[signal.reader.index];
     const valid = own.signals.find(({ input }) => input === signal.index)?.valid ?? null;
-    const value = valueText(own.input_values?.[signal.index], signal.input.type);
+    const value = textOf(signal.input, own.input_values?.[signal.index]);
     const words = valid === null ? "validity not known" : valid ? "valid" : "not valid: default value";
     arrows[row].show(value, valid);
     setAttribute(items[row], "data-valid", String(valid));

@@ -1,7 +1,7 @@
 // The signals of all programs: inputs, outputs, and what is in their states. Each has an identifier such as `0.input.3` or `1.state.pressing`.
 
 import { act, ask } from "/ask.js";
-import { el, keyed, setText } from "/element.js";
+import { el, keyed, setText, valueText } from "/element.js";
 
 // Signals in a list, at most; a search finds the others.
 const LISTED = 120;
@@ -67,6 +67,12 @@ export const find = (id) => byId.get(id);
 
 export const fullName = (signal) => `${programs[signal.program]}.${signal.name}`;
 
+// A value of a signal as its card says: with its decimals and its unit.
+export function textOf(signal, value) {
+  const text = valueText(value, signal.type, signal.decimals);
+  return signal.unit && typeof value === "number" ? `${text} ${signal.unit}` : text;
+}
+
 // A list of all signals with a search; `isChosen` and `toggle` take an identifier.
 export function chooser(name, isChosen, toggle) {
   let words = "";
@@ -80,13 +86,13 @@ export function chooser(name, isChosen, toggle) {
       show();
     }
   });
-  const matches = (signal) => [fullName(signal), signal.kind, signal.type, signal.address ?? "", signal.comment ?? ""].some((text) => text.toLowerCase().includes(words));
+  const matches = (signal) => [fullName(signal), signal.kind, signal.type, signal.address ?? "", signal.description ?? "", signal.group ?? ""].some((text) => text.toLowerCase().includes(words));
   function show() {
     const found = all.filter(matches);
     keyed(list, found.slice(0, LISTED), (signal) => signal.id,
       (signal) => el("label", { class: "choice" },
         el("input", { type: "checkbox", value: signal.id, change: () => { toggle(signal.id); show(); } }),
-        ` ${fullName(signal)} `, el("span", { class: "soft" }, signal.kind)),
+        ` ${fullName(signal)} `, el("span", { class: "soft" }, [signal.kind, signal.group].filter(Boolean).join(", "))),
       (label, signal) => { label.firstChild.checked = isChosen(signal.id); });
     setText(more, found.length > LISTED ? `${LISTED} of ${found.length} signals: search for the others` : found.length === 0 ? "no signal" : "");
   }

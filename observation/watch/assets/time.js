@@ -65,8 +65,8 @@ export const onState = (listener) => listeners.add(listener);
 export const state = () => shown;
 export const isLive = () => live;
 
-// A parameter for the server's questions.
-export const cycleParameter = () => (live || !shown ? "" : `cycle=${shown.cycle}`);
+// A parameter for the server's questions: every view shows the same cycle, also of a live run.
+export const cycleParameter = () => (shown ? `cycle=${shown.cycle}` : "");
 
 function show(next) {
   shown = next;

@@ -5,10 +5,10 @@ import { act, ask, toast } from "/ask.js";
 import { csvOf, csvOfColumns, reader, saveCsv, savePng } from "/download.js";
 import { el, keyed, setText } from "/element.js";
 import { keep, kept } from "/kept.js";
-import { asked, chooser, find, load } from "/signals.js";
+import { asked, chooser, find, fullName, load } from "/signals.js";
 import { goTo, isLive, state } from "/time.js";
 import { bandPlugin, limitPlugin } from "/bands.js";
-import { heightOf, labelsOf, laneText, lanesOf, tickStep, ticks } from "/lanes.js";
+import { SCALES, heightOf, heightOfAll, labelsOf, lanesOf, tickStep, ticks, unitText } from "/lanes.js";
 import { bandLegend } from "/legend.js";
 import { clock, clockAndZone, clockOf, dayOf, local, timeOf } from "/zone.js";
 
@@ -16,6 +16,8 @@ let run = null;
 let plot = null;
 let choice = null;
 let chosen = [];
+// The scales of signals, by identifier, of those that have none of their own.
+let scales = {};
 let span = 500;
 // The first and the last cycle, where they do not follow the newest cycle.
 let zoom = null;
@@ -69,6 +71,7 @@ export function prepare(facts) {
     el("p", { id: "trend-words", class: "stamp soft", role: "status" }),
     el("div", { id: "trend-plot", class: "plot", tabindex: "0", role: "group", "aria-label": "Trends of the chosen signals; plus and minus zoom, 0 ends it", keydown: key }),
     bandLegend(),
+    el("fieldset", { id: "trend-scales", class: "tools", hidden: true }, el("legend", {}, "Scales")),
     el("section", { id: "trend-alarms-card", class: "card", "aria-labelledby": "trend-alarms-title", hidden: true },
       el("h2", { id: "trend-alarms-title" }, "Alarms in these cycles"), el("ul", { id: "trend-alarms", class: "plain" })),
     choice.element);
@@ -81,7 +84,7 @@ export function prepare(facts) {
 
 // What is chosen, as an address has it.
 export function selection() {
-  return { signals: chosen.join(","), span, from: zoom?.from, to: zoom?.to };
+  return { signals: chosen.join(","), scales: scalesText() || undefined, span, from: zoom?.from, to: zoom?.to };
 }
 
 export function select(wanted) {
@@ -93,10 +96,36 @@ function apply(wanted) {
   if (wanted.signals !== undefined) {
     chosen = wanted.signals.split(",").filter(Boolean).slice(0, MAXIMUM_SIGNALS);
   }
+  if (wanted.signals !== undefined || wanted.scales !== undefined) {
+    scales = Object.fromEntries((wanted.scales ?? "").split(",").map((text) => text.split(":")).filter(([, scale]) => SCALES.includes(scale)));
+  }
   span = spans.find(([known]) => known === Number(wanted.span))?.[0] ?? span;
   const [from, to] = [Number(wanted.from), Number(wanted.to)];
   const isRange = wanted.from !== undefined && Number.isInteger(from) && Number.isInteger(to) && from < to;
   zoom = isRange ? { from, to } : null;
+}
+
+// `0.output.1:left,1.input.0:right`
+const scalesText = () => chosen.filter((signal) => scales[signal]).map((signal) => `${signal}:${scales[signal]}`).join(",");
+
+function setScale(signal, scale) {
+  scales = { ...scales, [signal]: scale === "own" ? undefined : scale };
+  picked();
+  redraw();
+}
+
+// A choice of the scale for each number, where there are two.
+function showScales() {
+  const numbers = chosen.map(find).filter((signal) => signal && signal.type !== "BOOL");
+  id("trend-scales").hidden = numbers.length < 2;
+  const choices = [["own", "of its own"], ["left", "left"], ["right", "right"]];
+  const line = (signal) => el("label", {}, `${fullName(signal)} `,
+    el("select", { "data-signal": signal.id, change: (event) => setScale(signal.id, event.target.value) }, choices.map(([value, words]) => el("option", { value }, words))), " ");
+  const place = id("trend-scales");
+  if (!place.querySelector("div")) {
+    place.append(el("div", { class: "tools" }));
+  }
+  keyed(place.querySelector("div"), numbers, (signal) => signal.id, line, (label, signal) => { label.querySelector("select").value = scales[signal.id] ?? "own"; });
 }
 
 function toggle(signal) {
@@ -111,13 +140,14 @@ function toggle(signal) {
 
 // A person has chosen.
 function picked() {
-  keep("trends", { signals: chosen.join(","), span });
+  keep("trends", { signals: chosen.join(","), scales: scalesText(), span });
   changed();
   refresh(true);
 }
 
 // Other points count: the same signals have other identifiers.
 export function replacePoints(renamed) {
+  scales = Object.fromEntries(Object.entries(scales).flatMap(([signal, scale]) => renamed([signal]).map((name) => [name, scale])));
   chosen = renamed(chosen);
   generation += 1;
   answer = null;
@@ -249,7 +279,7 @@ async function refresh(now) {
 const atOf = (cycle) => timeOf(answer.times, cycle, run.period_us);
 
 // The unit of a signal, where the cluster file has it.
-const unitOf = (index) => find(answer.ids[index])?.operator?.unit ?? "";
+const unitOf = (index) => find(answer.ids[index])?.unit ?? "";
 
 const nameOfFile = () => `${run.cluster}-trends-${answer.from}-${answer.to}`;
 
@@ -288,9 +318,9 @@ function rowsOf(lanes) {
 function wordsAt(lane, signal, values, place) {
   const range = answer.column ? signal.columns[place >> 1] : null;
   if (range && range[0] !== range[1]) {
-    return `${laneText(range[0], lane)} … ${laneText(range[1], lane)}`;
+    return `${unitText(range[0], lane)} … ${unitText(range[1], lane)}`;
   }
-  return values[place] === null ? "not known" : laneText(values[place], lane);
+  return values[place] === null ? "not known" : unitText(values[place], lane);
 }
 
 // The ticks of the axis of time, with their words: round times of day, and the cycle as the second scale.
@@ -312,11 +342,13 @@ function timeAxis(width) {
 
 function draw() {
   const place = id("trend-plot");
-  const lanes = lanesOf(answer.signals, (index) => find(answer.ids[index]), unitOf);
-  const height = lanes.reduce((sum, lane) => sum + lane.height, 0);
+  const lanes = lanesOf(answer.signals, (index) => find(answer.ids[index]), (index) => scales[answer.ids[index]] ?? "own");
+  const height = heightOfAll(lanes);
   const letters = place.clientWidth < 700 ? 16 : 30;
-  const labels = lanes.flatMap((lane) => labelsOf(lane, letters)).sort(([one], [other]) => one - other);
-  const left = Math.max(...[...labels.map(([, text]) => text), ...answer.sources.map(({ name }) => name.slice(0, 18))].map((text) => text.length), 8) * 7 + 22;
+  const [labels, rightLabels] = ["left", "right"].map((side) => labelsOf(lanes, side, letters));
+  const widthOf = (texts) => Math.max(...texts.map((text) => text.length), 8) * 7 + 22;
+  const left = widthOf([...labels.map(([, text]) => text), ...answer.sources.map(({ name }) => name.slice(0, 18))]);
+  const right = rightLabels.length > 0 ? widthOf(rightLabels.map(([, text]) => text)) : 0;
   const { cycles, values } = rowsOf(lanes);
   const rows = values.map((row, index) => row.map((value) => (value === null ? null : heightOf(lanes[index], value))));
   const dark = getComputedStyle(document.documentElement);
@@ -332,15 +364,18 @@ function draw() {
   }));
   const bands = [...answer.sources, ...alarmBand()];
   const bandRows = bands.length;
-  const unit = Math.min(Math.max(Math.floor(360 / Math.max(height, 1)), 26), 48);
+  // The lanes use the height of the window, as far as they are not too high to compare.
+  const room = Math.max(360, innerHeight - place.getBoundingClientRect().top - scrollY - 18 * bandRows - 190);
+  const unit = Math.min(Math.max(Math.floor(room / Math.max(height, 1)), 26), 80);
   const axis = { stroke: color("--ink"), grid: { stroke: color("--line"), width: 1 }, ticks: { stroke: color("--line") } };
   const options = {
     width: place.clientWidth,
     height: Math.max(220, unit * height + 18 * bandRows + 110),
     scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(height, 1)] } },
     axes: [
-      { ...axis, ...timeAxis(place.clientWidth - left) },
+      { ...axis, ...timeAxis(place.clientWidth - left - right) },
       { ...axis, size: left, splits: () => labels.map(([at]) => at), values: () => labels.map(([, text]) => text), grid: { show: false } },
+      ...(right > 0 ? [{ ...axis, side: 1, size: right, splits: () => rightLabels.map(([at]) => at), values: () => rightLabels.map(([, text]) => text), grid: { show: false } }] : []),
     ],
     series: [{ label: "cycle", value: (_, value) => (value === null ? "" : [value, clock(atOf(value), true)].filter((part) => part !== "").join(" · ")) }, ...series],
     plugins: [bandPlugin({ ...answer, sources: bands }, color), limitPlugin(lanes, color)],
@@ -367,6 +402,7 @@ function draw() {
   const columns = answer.column ? `; the least and the greatest value of every ${answer.column} cycles` : "";
   setText(id("trend-words"), `cycles ${answer.from} to ${answer.to}, ${lengthText(seconds)}${zoom ? ", zoomed" : ""}${columns}${missing(cycles, values)}; a click goes to the cycle, dragging zooms`);
   showAlarms();
+  showScales();
 }
 
 const lengthText = (seconds) => (seconds < 600 ? `${seconds.toFixed(1)} s` : seconds < 36_000 ? `${(seconds / 60).toFixed(0)} min` : `${(seconds / 3600).toFixed(1)} h`);

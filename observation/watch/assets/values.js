@@ -2,9 +2,9 @@
 
 import { addressOf, changed } from "/address.js";
 import { act, ask } from "/ask.js";
-import { el, keyed, setAttribute, setText, valueText } from "/element.js";
+import { el, keyed, setAttribute, setText } from "/element.js";
 import { keep, kept } from "/kept.js";
-import { asked as askedFor, chooser, find, fullName, load } from "/signals.js";
+import { asked as askedFor, chooser, find, fullName, load, textOf } from "/signals.js";
 import { cycleParameter, isLive, state } from "/time.js";
 
 const MAXIMUM_SIGNALS = 100;
@@ -132,9 +132,9 @@ function fill(values, cycle, unknown = []) {
     const value = values.get(signal.id);
     // A forced output is driven with the forced value.
     const text = unknown.includes(signal.id) ? "no such signal"
-      : valueText(force && signal.kind === "output" ? force.value : value, signal.type);
+      : textOf(signal, force && signal.kind === "output" ? force.value : value);
     setText(row.querySelector(".watch-value"), text);
-    setText(row.querySelector(".watch-forced"), force ? ` F forced by ${force.owner}` : "");
+    setText(row.querySelector(".watch-forced"), force ? ` F forced by ${force.owner}, ${force.left_s} s left` : "");
     setAttribute(row, "data-value", text);
   });
 }
@@ -148,6 +148,6 @@ function makeRow(signal) {
   return el("tr", { "data-signal": signal.id },
     el("td", {}, fullName(signal).slice(0, -signal.name.length - 1)), el("th", { scope: "row" }, signal.name), el("td", {}, signal.kind), el("td", {}, signal.type),
     el("td", {}, el("span", { class: "watch-value" }, "?"), el("span", { class: "watch-forced bad" })),
-    el("td", {}, signal.address ?? ""), el("td", { class: "soft" }, signal.comment ?? ""),
+    el("td", {}, signal.address ?? ""), el("td", { class: "soft" }, signal.description ?? ""),
     el("td", {}, el("button", { type: "button", class: "link", "aria-label": `Remove ${fullName(signal)}`, click: () => toggle(signal.id) }, "Remove")));
 }

@@ -60,7 +60,7 @@ async function explain(program, output, cycle, takesFocus) {
   }
   const close = el("button", { type: "button", click: hide }, "Close");
   drawer.replaceChildren(
-    el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueText(answer.value, answer.type)}?`), close),
+    el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueOf(answer, answer.value)}?`), close),
     el("p", { class: "soft" }, `${answer.program}, ${answer.at ? `${clockAndZone(answer.at)}, ` : ""}cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
     ...(answer.because ? [el("ul", { class: "cause" }, tree(answer.because))] : []),
@@ -74,6 +74,9 @@ async function explain(program, output, cycle, takesFocus) {
   }
 }
 
+// A value with its unit, and not rounded to its decimals: a comparison reads them all.
+const valueOf = ({ type, unit }, value) => [valueText(value, type), unit].filter(Boolean).join(" ");
+
 // Source of the value and its proof: equation (12) with its numbers.
 function source(answer) {
   const lines = [];
@@ -84,11 +87,11 @@ function source(answer) {
   if (kept !== undefined) {
     lines.push(`The remote I/O missed this deadline: the device kept the value of cycle ${kept}.`);
   } else {
-    const it = forced ? `Without the force it would be ${valueText(forced.unforced, answer.type)},` : "It is";
+    const it = forced ? `Without the force it would be ${valueOf(answer, forced.unforced)},` : "It is";
     lines.push(`${it} ${SOURCES[answer.source]?.words ?? "not known yet"}${answer.missing ? `: ${answer.missing}` : ""}.`);
   }
   if (answer.scanned !== null && answer.scanned !== answer.value) {
-    lines.push(`The scan of the program yields ${valueText(answer.scanned, answer.type)}.`);
+    lines.push(`The scan of the program yields ${valueOf(answer, answer.scanned)}.`);
   }
   const { reconstructed } = answer;
   if (reconstructed) {
@@ -105,7 +108,7 @@ function source(answer) {
 function tree(reason) {
   const line = [
     el("button", { class: "link", type: "button", click: () => goTo(reason.cycle) }, `cycle ${reason.cycle}`), reason.at ? ` ${clock(reason.at, true)}` : "",
-    ` ${reason.signal} = ${valueText(reason.value, reason.type)}`,
+    ` ${reason.signal} = ${valueOf(reason, reason.value)}`,
     reason.rung ? `, rung ${reason.rung}${reason.title ? ` “${reason.title}”` : ""}` : "",
     reason.line ? [`, line ${reason.line} `, el("code", {}, reason.statement)] : null,
     `: ${reason.text}`];

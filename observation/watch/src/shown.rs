@@ -137,6 +137,8 @@ struct ShownForce {
     bit: u16,
     value: serde_json::Value,
     seconds: u32,
+    /// Seconds until it ends by itself.
+    left_s: u64,
     owner: String,
     reason: String,
 }
@@ -315,7 +317,13 @@ fn shown_program(
         forced: program
             .forces
             .iter()
-            .map(|force| shown_force(snapshot.points.controller(of), force))
+            .map(|(force, since)| {
+                let cycles = snapshot.cycle.unwrap_or(*since).saturating_sub(*since).max(0);
+                let passed_us = cycles.unsigned_abs().saturating_mul(snapshot.period_us);
+                let whole_us = u64::from(force.seconds) * 1_000_000;
+                let left_s = whole_us.saturating_sub(passed_us).div_ceil(1_000_000);
+                shown_force(snapshot.points.controller(of), force, left_s)
+            })
             .collect(),
         protection: program.protection.clone().map(|protection| ShownProtection {
             words: protection.text(),
@@ -354,7 +362,7 @@ fn signals(points: &PointsInEffect, of: ProgramId, program: &ProgramSnapshot) ->
     shown.collect()
 }
 
-fn shown_force(controller: Option<&Controller>, force: &Force) -> ShownForce {
+fn shown_force(controller: Option<&Controller>, force: &Force, left_s: u64) -> ShownForce {
     let point = controller.and_then(|controller| forced_point(controller, force));
     let interface = controller.map(|controller| &controller.interface);
     let (kind, points) = match force.signal {
@@ -371,6 +379,7 @@ fn shown_force(controller: Option<&Controller>, force: &Force) -> ShownForce {
             None => force.value.stored().into(),
         },
         seconds: force.seconds,
+        left_s,
         owner: force.owner.clone(),
         reason: force.reason.clone(),
     }

@@ -31,6 +31,8 @@ pub struct Step {
 pub struct Transition {
     /// Its condition.
     pub condition: String,
+    /// What the condition came to in the scan; nothing where it was not evaluated, or no scan is shown.
+    pub truth: Option<bool>,
     /// The steps that it leaves.
     pub from: Vec<usize>,
     /// The steps that it enters.

@@ -291,9 +291,14 @@ impl Picture {
             Part::Actions(step) => self.actions(&chart.steps[step].actions, place),
             Part::Transition(transition) => {
                 let ends = [place.x, place.right()].map(|x| Point { x, y: middle });
-                self.line("bar", &ends);
-                let condition = &chart.transitions[transition].condition;
-                self.text("pin", place.right() + CHARACTER, middle, condition);
+                let transition = &chart.transitions[transition];
+                let (bar, words) = match transition.truth {
+                    None => ("bar", "pin"),
+                    Some(true) => ("live", "one"),
+                    Some(false) => ("bar", "zero"),
+                };
+                self.line(bar, &ends);
+                self.text(words, place.right() + CHARACTER, middle, &transition.condition);
             }
             Part::Jump(step) => {
                 let name = &chart.steps[step].name;

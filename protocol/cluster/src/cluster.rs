@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use crate::address::Addresses;
 use crate::alarm::AlarmDeclaration;
+use crate::card::Cards;
 use crate::code::Code;
 use crate::device::FieldDevice;
 use crate::notify::Notify;
@@ -240,6 +241,7 @@ pub struct Cluster {
     pub(crate) plants: Vec<Option<PlantPlace>>,
     pub(crate) alarms: Arc<[AlarmDeclaration]>,
     pub(crate) notify: Option<Notify>,
+    pub(crate) cards: Arc<Cards>,
     pub(crate) programs: Arc<[Program]>,
     pub(crate) parity: Option<ParityController>,
 }

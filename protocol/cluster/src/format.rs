@@ -7,6 +7,7 @@ use std::time::Duration;
 use understudy_text::duration;
 use understudy_wire::MAXIMUM_HISTORY;
 
+use crate::card::MAXIMUM_DECIMALS;
 use crate::place::{ByteOrder, Registers};
 
 /// The bounds of a cluster's period.
@@ -45,6 +46,8 @@ pub(crate) enum Kind {
     Connection,
     /// A whole number.
     Count { least: u32, most: u32, default: u32 },
+    /// A whole number from 0, without a default.
+    Digits { most: u32 },
     /// A number with or without a fraction; at most so large, with either sign.
     Number { most: f64, default: f64 },
     /// A number with its unit.
@@ -318,6 +321,23 @@ pub(crate) static ALARM: Section = Section {
     },
 };
 
+/// The table of the cards of signals.
+pub(crate) const SIGNALS: &str = "signals";
+
+pub(crate) static SIGNAL: Section = Section {
+    name: "signals.NAME",
+    repeated: false,
+    meaning: "how an input or output is shown, by controller and name, such as `\"tank.level\"`",
+    keys: keys! {
+        key unit: Kind::Text, "unit of a number, such as `°C`; that of a setpoint where absent";
+        key decimals: Kind::Digits { most: MAXIMUM_DECIMALS }, "digits after the decimal point of a REAL or LREAL";
+        key low: Kind::Value, "lowest value of scales; that of a setpoint where absent";
+        key high: Kind::Value, "highest value of scales; that of a setpoint where absent";
+        key description: Kind::Text, "what the signal means; the comment of its declaration where absent";
+        key group: Kind::Text, "the part of the plant that it belongs to, such as `heating`";
+    },
+};
+
 pub(crate) static NOTIFY: Section = Section {
     name: "notify",
     repeated: false,
@@ -449,6 +469,7 @@ impl Kind {
                 "an address or a serial line in quotes, such as \"192.168.1.40:502\" or \"rtu:/dev/ttyUSB0\"".into()
             }
             Self::Count { least, most, .. } => format!("a whole number from {least} to {most}"),
+            Self::Digits { most } => format!("a whole number from 0 to {most}"),
             Self::Number { most, .. } => format!("a number from -{most} to {most}"),
             Self::Time { least, most, .. } => format!(
                 "a time with its unit in quotes, from \"{}\" to \"{}\"",

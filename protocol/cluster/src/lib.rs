@@ -10,6 +10,7 @@
 mod address;
 mod alarm;
 mod canonical;
+mod card;
 mod change;
 mod cluster;
 mod code;
@@ -36,6 +37,7 @@ pub use address::{
     Addresses, MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
 };
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
+pub use card::{Card, CardFacts, MAXIMUM_DECIMALS};
 pub use change::{
     ChangeError, ChangeTexts, ChangedFallback, ChangedInitial, ChangedPoint, ChangedPoints,
     ChangedSetting, ChangedText, CommonPoints, FallbackText, FixedPoints, NeedsStop, OnlineChanges,

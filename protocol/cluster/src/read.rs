@@ -38,8 +38,10 @@
 //! | U0258 | warning: a watchdog of a simulated plant that runs out before the twin has taken over |
 //! | U0262 | warning: a twin on the machine of its remote I/O |
 //! | U0263 | a direct link that does not join the two remote I/Os of a program, or that is a network |
+//! | U0264 | a card that does not fit its signal |
 
 mod alarms;
+mod cards;
 mod devices;
 mod diagnosis;
 mod fail_safe;
@@ -221,6 +223,7 @@ fn build(
         undriven::check(&members, &remote_ios, &simulated, diagnostics);
     }
     let alarms = alarms::resolve(file.alarms, &members, period, diagnostics);
+    let cards = cards::resolve(file.signals, &members, &remote_ios, diagnostics);
     limits::check(&members, &remote_ios, cluster.history, diagnostics);
     let mode = overrides.mode.unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
     check_understudies(&understudies, mode, &cluster.span, diagnostics);
@@ -288,6 +291,7 @@ fn build(
         plants: plants.places,
         alarms: alarms.into(),
         notify: file.notify,
+        cards: Arc::new(cards),
         programs,
         parity,
     };

@@ -7,8 +7,8 @@ use understudy_text::duration;
 use crate::address::MAXIMUM_NAME_LENGTH;
 use crate::format::{
     CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, PLANT_FILE_REQUIRED,
-    PLANT_FILE_SECTIONS, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT,
-    Section, TWIN,
+    PLANT_FILE_SECTIONS, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, SIGNAL, SIGNAL_INPUT,
+    SIGNALS, Section, TWIN,
 };
 use crate::place::{ByteOrder, Registers};
 
@@ -16,6 +16,11 @@ use crate::place::{ByteOrder, Registers};
 ///
 /// Bounds of times, and that names, addresses and signals fit together, are beyond a schema; [`crate::read`] checks them.
 pub fn schema() -> Schema {
+    let cards = json!({
+        "type": "object",
+        "description": SIGNAL.meaning,
+        "additionalProperties": table(&SIGNAL),
+    });
     let sections = SECTIONS.map(|section| {
         let table = table(section);
         let value = if section.repeated {
@@ -32,7 +37,7 @@ pub fn schema() -> Schema {
         "type": "object",
         "additionalProperties": false,
         "required": [CLUSTER.name, CONTROLLER.name],
-        "properties": Value::Object(sections.into_iter().collect()),
+        "properties": Value::Object(sections.into_iter().chain([(SIGNALS.to_owned(), cards)]).collect()),
     })
 }
 
@@ -85,6 +90,7 @@ fn property(key: &Key) -> Value {
         Kind::Count { least, most, default } => {
             json!({ "type": "integer", "minimum": least, "maximum": most, "default": default })
         }
+        Kind::Digits { most } => json!({ "type": "integer", "minimum": 0, "maximum": most }),
         Kind::Time { .. } => {
             json!({ "type": "string", "pattern": duration::pattern() })
         }

@@ -1,11 +1,11 @@
 //! The signals of a program: its inputs, its outputs, and the markers that its state is made of.
 
 use opcua::types::Variant;
-use understudy_cluster::{Controller, InputSource};
+use understudy_cluster::{Card, Controller, InputSource};
 use understudy_remote_io::OperatorInputKind;
 use understudy_typed::{Elementary, Point};
-use understudy_view::ImageSide;
-use understudy_wire::{Member, ProgramId};
+use understudy_view::{ImageSide, state_signals_of};
+use understudy_wire::{Image, Member, ProgramId};
 
 use super::{Kind, Tree, WritableInput};
 use crate::trust;
@@ -22,6 +22,7 @@ impl Tree {
         place: usize,
         controller: &Controller,
         sources: &[InputSource],
+        card: impl Fn(&str) -> Card,
     ) {
         self.enter(&["Programs", &controller.name, "Inputs"]);
         let inputs = &controller.interface.inputs;
@@ -41,8 +42,8 @@ impl Tree {
                 let value = value.map(|stored| variant_of_stored(own.of, stored));
                 seen.present(value, trust.unwrap_or_default())
             });
+            self.show(point, card(&point.name));
             if let Some(added) = self.variables.last_mut() {
-                added.names = value_names(point);
                 added.writable = writable.map(|(_, writable)| writable);
             }
         }
@@ -60,9 +61,7 @@ impl Tree {
                 let value = value.map(|stored| variant_of_stored(own.of, stored));
                 seen.present(value, trust.unwrap_or_default())
             });
-            if let Some(added) = self.variables.last_mut() {
-                added.names = value_names(point);
-            }
+            self.show(point, card(&point.name));
         }
         self.enter(&["Programs", &controller.name, "Markers"]);
         let registers = controller.code.registers();
@@ -70,12 +69,45 @@ impl Tree {
         for word in words(&names) {
             let (kind, bits) = (word.kind, word.bits);
             self.add(&word.name, kind, "value in the state before the last sample", move |seen| {
-                let states = &seen.observation.states;
-                let state = states.get(place).and_then(Option::as_deref);
-                let value = state.and_then(|state| word_of(kind, &bits, state));
-                let own = seen.program(place).map(trust::state);
-                seen.present(value, own.unwrap_or_default())
+                seen.in_state(place, |state| word_of(kind, &bits, state))
             });
+        }
+        if controller.circuit().is_none() {
+            self.variables_of(place, controller);
+        }
+    }
+
+    /// The variables of a program that is no ladder. Its state is that of its text.
+    fn variables_of(&mut self, place: usize, controller: &Controller) {
+        for signal in state_signals_of(controller) {
+            let Some(of) = signal.elementary() else {
+                continue;
+            };
+            let meaning = match of.is_time() {
+                true => "value in the state before the last sample, in nanoseconds",
+                false => "value in the state before the last sample",
+            };
+            let own = signal.clone();
+            self.add(&signal.name, kind_of(of), meaning, move |seen| {
+                seen.in_state(place, |state| {
+                    let stored = own.stored(state.words());
+                    stored.map(|stored| variant_of_stored(of, stored))
+                })
+            });
+        }
+    }
+}
+
+impl Tree {
+    /// Gives the variable of a point, which was added last, its card: the description comes before what its value is.
+    fn show(&mut self, point: &Point, card: Card) {
+        let Some(added) = self.variables.last_mut() else {
+            return;
+        };
+        added.names = value_names(point);
+        added.card = card.facts(point.of);
+        if let Some(description) = &added.card.description {
+            added.meaning = format!("{description}; {}", added.meaning).into();
         }
     }
 }
@@ -111,29 +143,18 @@ fn written(
     source: &InputSource,
 ) -> Option<(&'static str, WritableInput)> {
     let declaration = source.operator()?;
-    let number = |stored| match variant_of_stored(point.of, stored) {
-        Variant::Double(number) => number,
-        Variant::Int64(number) => number as f64,
-        Variant::UInt64(number) => number as f64,
-        _ => 0.0,
-    };
-    let (meaning, limits) = match declaration.input.kind {
-        OperatorInputKind::Level => ("level that operators write, as last sampled", None),
-        OperatorInputKind::Pulse(_) => ("pulse: writing TRUE presses it", None),
-        OperatorInputKind::Group { .. } => ("signal of another group, as last sampled", None),
-        OperatorInputKind::Setpoint { low, high } => (
-            match point.of.is_time() {
-                true => "setpoint that operators write, as last sampled, in nanoseconds",
-                false => "setpoint that operators write, as last sampled",
-            },
-            Some((number(low), number(high))),
-        ),
+    let meaning = match declaration.input.kind {
+        OperatorInputKind::Level => "level that operators write, as last sampled",
+        OperatorInputKind::Pulse(_) => "pulse: writing TRUE presses it",
+        OperatorInputKind::Group { .. } => "signal of another group, as last sampled",
+        OperatorInputKind::Setpoint { .. } => match point.of.is_time() {
+            true => "setpoint that operators write, as last sampled, in nanoseconds",
+            false => "setpoint that operators write, as last sampled",
+        },
     };
     let writable = WritableInput {
         member: Member::RemoteIo(ProgramId(u8::try_from(place).ok()?)),
         point: point.clone(),
-        limits,
-        unit: declaration.unit.clone(),
     };
     Some((meaning, writable))
 }
@@ -176,8 +197,9 @@ fn words(names: &[&str]) -> Vec<Word> {
     words
 }
 
-fn word_of(kind: Kind, bits: &[usize], state: &[bool]) -> Option<Variant> {
-    let bits: Option<Vec<bool>> = bits.iter().map(|place| state.get(*place).copied()).collect();
+fn word_of(kind: Kind, bits: &[usize], state: &Image) -> Option<Variant> {
+    let bit = |place: &usize| (*place < state.width()).then(|| state.get(*place));
+    let bits: Option<Vec<bool>> = bits.iter().map(bit).collect();
     let bits = bits?;
     if kind == Kind::Boolean {
         return bits.first().copied().map(Variant::from);
@@ -224,7 +246,7 @@ mod tests {
             bit("b.0", 6),
         ];
         assert_eq!(found, expected);
-        let state = [false, true, false, true, false, false, false];
+        let state = Image::from_words(7, &[0b1010]).expect("in bounds");
         let value = |kind, bits: &[usize]| word_of(kind, bits, &state);
         assert_eq!(value(Kind::UInt64, &[1, 2, 3]), Some(Variant::from(5_u64)));
         assert_eq!(value(Kind::Boolean, &[3]), Some(Variant::from(true)));

@@ -232,3 +232,52 @@ fn a_variable_is_what_the_author_of_its_point_declared() {
         }
     }
 }
+
+const TANK: &str = "PROGRAM tank
+  VAR_INPUT level : REAL; (* from the comment *) END_VAR
+  VAR_OUTPUT full : BOOL; END_VAR
+  VAR scans : UINT; pause : TON; END_VAR
+  scans := scans + 1;
+  pause(IN := TRUE, PT := T#1s);
+  full := level > 2.0;
+END_PROGRAM";
+
+const TANK_CLUSTER: &str = r#"
+[cluster]
+name = "cell"
+period = "10ms"
+[[controller]]
+name = "tank"
+ladder = "tank.st"
+[signals]
+"tank.level" = { unit = "m", low = 0, high = 2.5 }
+"tank.full" = { description = "The tank is full" }
+"#;
+
+/// A client finds the card of a signal, and the variables of a program that is no ladder.
+#[test]
+fn signals_have_their_cards_and_programs_with_numbers_their_variables() {
+    let mut open = |_: &str| Ok(TANK.to_owned());
+    let loaded = understudy_cluster::read("cluster.toml", TANK_CLUSTER, &mut open);
+    let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    let variables = variables(&cluster);
+    let variable = |path: &str| {
+        let found = variables.iter().find(|variable| variable.path() == path);
+        found.unwrap_or_else(|| panic!("no {path}"))
+    };
+    let level = variable("Programs/tank/Inputs/level");
+    assert_eq!(level.meaning(), "from the comment; as last sampled");
+    let card = level.card();
+    assert_eq!((card.unit.as_deref(), card.low, card.high), (Some("m"), Some(0.0), Some(2.5)));
+    assert_eq!(variable("Programs/tank/Outputs/full").meaning(), "The tank is full; as driven");
+    let observation = observed(&cluster, "", 30);
+    let seen = Seen { observation: &observation, feed: Feed::Live };
+    let scans = reading(&cluster, &seen, "Programs/tank/Markers/scans");
+    let Some(Variant::UInt64(scans)) = scans.value else {
+        panic!("{scans:?}");
+    };
+    let elapsed = reading(&cluster, &seen, "Programs/tank/Markers/pause.ET").value;
+    // The first call of the timer is at 0 ms.
+    assert_eq!(elapsed, Some(Variant::Int64((scans as i64 - 1).min(100) * 10_000_000)));
+    assert!((20..=40).contains(&scans), "{scans}");
+}

@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 use understudy_journal::{Cycles, Happening, Members, NamedSignal, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_typed::{Declared, Elementary};
+use understudy_typed::Elementary;
 use understudy_wire::{Force, Image, Member, PointValue, ProgramId, SignalPlace, WriteId};
 
 use crate::value::{is_declared, stored_text};
@@ -125,8 +125,7 @@ pub(super) fn image_text<'a>(
         let bit = usize::from(signal.place.first_bit());
         // No point crosses a word.
         let stored = image.words()[bit / 64] >> (bit % 64) & signal.declared.of.mask();
-        let text = number_text(&signal.declared, stored, signal.unit.as_deref());
-        format!("{} = {text}", signal.name)
+        format!("{} = {}", signal.name, number_text(signal, stored))
     });
     texts.collect::<Vec<String>>().join(", ")
 }
@@ -159,7 +158,7 @@ fn signal_value(
     let known = known.filter(|signal| signal.declared.of.bits() == u32::from(value.width()));
     match (known, value) {
         (_, PointValue::Bit(bit)) => u8::from(bit).to_string(),
-        (Some(signal), _) => number_text(&signal.declared, stored, signal.unit.as_deref()),
+        (Some(signal), _) => number_text(signal, stored),
         (None, PointValue::Number { width, .. }) => {
             let digits = usize::from(width) / 4;
             format!("16#{stored:0digits$X}")
@@ -191,12 +190,9 @@ pub(crate) fn modules_text(
     texts.collect::<Vec<_>>().join("; ")
 }
 
-fn number_text(declared: &Declared, stored: u64, unit: Option<&str>) -> String {
-    let text = stored_text(declared, stored);
-    match unit {
-        Some(unit) => format!("{text} {unit}"),
-        None => text,
-    }
+/// With all digits: what was written, and what a scan has read, is not rounded.
+fn number_text(signal: &NamedSignal, stored: u64) -> String {
+    signal.card.with_unit(stored_text(&signal.declared, stored))
 }
 
 /// `speed = 120.0 mm/s`

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_cluster::{Cluster, Controller, same_point};
+use understudy_cluster::{Card, Cluster, Controller, same_point};
 use understudy_journal::{Members, PointsInEffect, Present, SourceCounts, TimeOfDay};
 use understudy_ladder::Evaluation;
 use understudy_typed::{Point, Trace};
@@ -278,6 +278,11 @@ impl Model {
     pub fn points_in(&self, cycle: Option<i64>) -> PointsInEffect {
         let versions = self.program_ids().filter_map(|program| self.points_version(program, cycle));
         self.present.with(&versions.collect::<Vec<_>>())
+    }
+
+    /// How an input or output is shown that counts in a cycle.
+    pub fn card(&self, program: ProgramId, name: &str, cycle: i64) -> Card {
+        self.points_in(Some(cycle)).cluster().card(program, name)
     }
 
     /// The points that count after the newest record.

@@ -289,7 +289,7 @@ impl Picture<'_> {
             fail_safe,
             awaits_release: own.awaits_release,
             forced: self.forced(program),
-            forces: own.forced.into_iter().map(|forced| forced.force).collect(),
+            forces: own.forced.into_iter().map(|it| (it.force, it.since)).collect(),
             validity: self
                 .cycle
                 .map_or_else(BTreeMap::new, |cycle| self.model.validity(program, cycle)),
@@ -323,7 +323,12 @@ impl Picture<'_> {
                 Some(point) if point.of == Elementary::Bool => {
                     (point.name.as_str(), force.value.stored().to_string())
                 }
-                Some(point) => (point.name.as_str(), forced_value(point, force).to_string()),
+                Some(point) => {
+                    let cycle = self.cycle.unwrap_or(i64::MAX);
+                    let card = self.model.card(program, &point.name, cycle);
+                    let value = forced_value(point, force).to_string();
+                    (point.name.as_str(), card.with_unit(value))
+                }
                 None => ("an unknown signal", force.value.stored().to_string()),
             };
             format!("{name} = {value} by {}: {}", force.owner, force.reason)

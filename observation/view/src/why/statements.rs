@@ -196,6 +196,7 @@ impl<'m> Explainer<'m> {
             signal: signal.to_owned(),
             value: value.map_or(Value::Null, |(declared, (_, stored))| shown(declared, stored)),
             of: declared,
+            unit: None,
             cycle: self.cycle(place),
             rung: None,
             title: None,

@@ -13,7 +13,7 @@ impl Why {
     /// For a terminal, with times of day in a zone; lines end in a newline.
     pub fn to_text(&self, zone: Zone) -> String {
         let mut text = String::new();
-        let value = text_of(&self.value, self.of.as_ref());
+        let value = self.text_of(&self.value);
         let at = self.at.map_or_else(String::new, |at| format!(", {}", zone.whole(at)));
         let _ = writeln!(
             text,
@@ -29,7 +29,7 @@ impl Why {
         }
         self.write_driving(&mut text);
         if let Some(scanned) = &self.scanned {
-            let scanned = text_of(scanned, self.of.as_ref());
+            let scanned = self.text_of(scanned);
             let _ = writeln!(text, "  the scan of this cycle yields {scanned}");
         }
         if let Some(inputs) = self.inputs_text.as_ref().filter(|it| !it.is_empty()) {
@@ -67,7 +67,7 @@ impl Why {
         // Of a forced output the value without the force.
         let it = if self.forced.is_some() { "that" } else { "it" };
         if let Some(configured) = &self.ramp_to {
-            let configured = text_of(configured, self.of.as_ref());
+            let configured = self.text_of(configured);
             let _ = writeln!(text, "  {it} is on its ramp to the fail-safe value {configured}");
         } else if self.source == Some(FAIL_SAFE) {
             let _ = writeln!(text, "  {it} is the configured fail-safe value");
@@ -81,6 +81,10 @@ impl Why {
 }
 
 impl Why {
+    fn text_of(&self, value: &Value) -> String {
+        text_of(value, self.of.as_ref(), self.unit.as_deref())
+    }
+
     /// The remote I/O that drives an output, with the force that is in effect or the cycle that it missed.
     fn write_driving(&self, text: &mut String) {
         if let Some(force) = &self.forced {
@@ -104,7 +108,7 @@ impl Why {
         let unforced = self.forced.as_ref().and_then(|force| force.unforced.as_ref());
         let _ = match unforced {
             Some(value) => {
-                let value = text_of(value, self.of.as_ref());
+                let value = self.text_of(value);
                 writeln!(
                     text,
                     "  {} drives it; without the force it would be {value}, {source}{why}",
@@ -119,13 +123,17 @@ impl Why {
 /// The source of values that no program computed.
 const FAIL_SAFE: &str = "fail-safe";
 
-/// A value as people read it: a time with its unit.
-fn text_of(value: &Value, declared: Option<&Declared>) -> String {
-    match (declared, value.as_i64()) {
+/// A value as people read it, with its unit and all digits: a comparison reads them all.
+fn text_of(value: &Value, declared: Option<&Declared>, unit: Option<&str>) -> String {
+    let text = match (declared, value.as_i64()) {
         (Some(declared), Some(stored)) if declared.of.is_time() => {
             stored_text(declared, stored as u64)
         }
         _ => value_text(value),
+    };
+    match unit {
+        Some(unit) => format!("{text} {unit}"),
+        None => text,
     }
 }
 
@@ -140,7 +148,7 @@ fn children(text: &mut String, reason: &Reason, indent: &str, zone: Zone) {
 }
 
 fn line(text: &mut String, reason: &Reason, parent: i64, zone: Zone) {
-    let value = text_of(&reason.value, reason.of.as_ref());
+    let value = text_of(&reason.value, reason.of.as_ref(), reason.unit.as_deref());
     let at = reason.at.map_or_else(String::new, |at| format!(", {}", zone.clock(at)));
     let when = if reason.cycle == parent {
         String::new()

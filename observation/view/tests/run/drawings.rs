@@ -46,6 +46,17 @@ PROGRAM blocks
 END_PROGRAM
 ";
 
+const LEAVES: &str = "\
+PROGRAM blocks
+  VAR_INPUT speed : INT; run : BOOL; END_VAR
+  VAR_OUTPUT y : INT; late : BOOL; n : INT; rest : REAL; END_VAR
+  IF NOT run THEN
+    RETURN;
+  END_IF;
+  y := speed * 3;
+END_PROGRAM
+";
+
 /// Counts up to 79, and runs in every other group of ten scans.
 const BELT: &str = "\
 PROGRAM belt
@@ -104,6 +115,7 @@ const RUNGS: &str = r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><typ
 fn cluster(text: &str) -> Cluster {
     let loaded = read_with("cluster.toml", text, Overrides::default(), &mut |name| match name {
         "blocks.st" => Ok(BLOCKS.to_owned()),
+        "leaves.st" => Ok(LEAVES.to_owned()),
         "belt.st" => Ok(BELT.to_owned()),
         "chart.st" => Ok(CHART.to_owned()),
         "gate.st" => Ok(GATE.to_owned()),
@@ -168,15 +180,54 @@ fn connections_show_what_the_scan_computed() {
 fn the_active_step_is_marked() {
     let model = model(CLUSTER);
     let mut seen = [0, 0];
+    let mut fired = 0;
     for cycle in 20..150 {
         let (svg, _) = model.drawing_at(ProgramId(1), cycle).expect("it has numbers");
-        let values = &model.snapshot_at(cycle).expect("known").programs[1].values;
-        let open = values["open"].as_bool().expect("a bit");
+        let bit = |cycle: i64, name: &str| {
+            let values = &model.snapshot_at(cycle).expect("known").programs[1].values;
+            values[name].as_bool().expect("a bit")
+        };
+        let (open, was_open, go) = (bit(cycle, "open"), bit(cycle - 1, "open"), bit(cycle, "go"));
+        // The condition behind the step that was active before the scan, and no other one.
+        let word = |bit: bool| if bit { "TRUE" } else { "FALSE" };
+        let (told, other) = match was_open {
+            true => {
+                (format!("transition Wide to Shut: NOT go is {}", word(!go)), "transition Shut")
+            }
+            false => (format!("transition Shut to Wide: go is {}", word(go)), "transition Wide"),
+        };
+        assert!(svg.contains(&format!("{told}, go = {}", word(go))), "cycle {cycle}: {svg}");
+        assert!(!svg.contains(other), "cycle {cycle}: {svg}");
+        let active = if open { "Wide" } else { "Shut" };
+        assert!(svg.contains(&format!("step {active}: active for ")), "cycle {cycle}: {svg}");
+        assert_eq!(svg.contains("class=\"live\""), open != was_open, "cycle {cycle}: {svg}");
+        fired += usize::from(open != was_open);
         let (_, behind) = svg.split_once("class=\"active\"").expect("an active step");
         let name = behind.split("</text>").next().unwrap_or_default();
         let step = if open { "Wide" } else { "Shut" };
         assert!(name.ends_with(step), "cycle {cycle}: {name}");
         seen[usize::from(open)] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 10) && fired > 2, "{seen:?} {fired}");
+}
+
+/// What no network holds is text with the values of the scan; a statement that was left out has no mark.
+#[test]
+fn what_is_not_drawn_is_text_with_values() {
+    let model = model(&CLUSTER.replace("\"blocks.st\"", "\"leaves.st\""));
+    let mut seen = [0, 0];
+    for cycle in 20..150 {
+        let (svg, error) = model.drawing_at(ProgramId(0), cycle).expect("it has numbers");
+        assert!(error.is_none(), "{error:?}");
+        let values = &model.snapshot_at(cycle).expect("known").programs[0].values;
+        let (run, speed) = (values["run"].as_bool().expect("a bit"), &values["speed"]);
+        assert!(svg.contains("as text, since it has"), "{svg}");
+        let line = svg.lines().find(|line| line.contains("y := speed * 3;"));
+        let line = line.unwrap_or_else(|| panic!("{svg}"));
+        assert!(line.contains(&format!("speed = {speed}")), "cycle {cycle}: {line}");
+        assert_eq!(line.contains('▸'), run, "cycle {cycle}: {line}");
+        assert!(!svg.contains("VAR_INPUT"), "{svg}");
+        seen[usize::from(run)] += 1;
     }
     assert!(seen.iter().all(|count| *count > 10), "{seen:?}");
 }

@@ -11,10 +11,10 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use understudy_cluster::{Controller, OperatorDeclaration};
+use understudy_cluster::{Card, CardFacts, Controller, OperatorDeclaration};
 use understudy_journal::PointsInEffect;
 use understudy_remote_io::{OperatorInput, OperatorInputKind};
-use understudy_typed::Points;
+use understudy_typed::{Point, Points};
 use understudy_view::shown as shown_value;
 use understudy_wire::{Member, ProgramId, Role};
 
@@ -76,7 +76,9 @@ struct SignalFacts {
     /// Its first bit in the image.
     bit: u32,
     address: Option<String>,
-    comment: Option<String>,
+    /// How it is shown.
+    #[serde(flatten)]
+    card: CardFacts,
     /// Of an input that operators write.
     operator: Option<OperatorFacts>,
     /// Of an input that is an output of another program.
@@ -89,7 +91,6 @@ struct OperatorFacts {
     /// `level`, `pulse` or `setpoint`.
     kind: &'static str,
     title: String,
-    unit: Option<String>,
     /// Whether the page asks before it writes.
     confirm: bool,
     /// Of a setpoint: a duration in nanoseconds, a value of an enumeration by its name.
@@ -187,8 +188,14 @@ fn program_facts(
     let plant = Member::Plant(program);
     let controller = points.controller(program);
     let name = |member| known.run.members().name(member).to_owned();
-    let mut inputs =
-        controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.inputs));
+    let facts = |of: fn(&Controller) -> &Points| {
+        let card = |name: &str| points.cluster().card(program, name);
+        let own = controller.into_iter();
+        let own = own.flat_map(|own| of(own).iter().map(move |point| (own, point)));
+        let facts = own.map(|(own, point)| signal_facts(own, point, card(&point.name)));
+        facts.collect::<Vec<SignalFacts>>()
+    };
+    let mut inputs = facts(|own| &own.interface.inputs);
     let remote_io = points.remote_io(program);
     for source in remote_io.iter().flat_map(|remote_io| &remote_io.inputs) {
         let input = inputs.iter_mut().find(|input| input.name == source.name);
@@ -208,7 +215,7 @@ fn program_facts(
         plant: cluster.member_name(plant).map(str::to_owned),
         points: points.versions().get(program.index()).map(ToString::to_string),
         inputs,
-        outputs: controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.outputs)),
+        outputs: facts(|own| &own.interface.outputs),
     }
 }
 
@@ -224,7 +231,6 @@ fn operator_facts(name: &str, declared: &OperatorDeclaration, role: Role) -> Opt
     Some(OperatorFacts {
         kind,
         title: declared.title.clone().unwrap_or_else(|| name.to_owned()),
-        unit: declared.unit.clone(),
         confirm: declared.confirm,
         low: limits.map(|(low, _)| shown_value(&declared.declared, low)),
         high: limits.map(|(_, high)| shown_value(&declared.declared, high)),
@@ -232,26 +238,19 @@ fn operator_facts(name: &str, declared: &OperatorDeclaration, role: Role) -> Opt
     })
 }
 
-fn signal_facts(controller: &Controller, points: &Points) -> Vec<SignalFacts> {
-    let declared = |name: &str| {
-        let mut variables = controller.code.typed().variables.iter();
-        let variable = variables.find(|variable| variable.name == name)?;
-        Some((variable.address.clone(), variable.description.clone()))
-    };
-    let facts = points.iter().map(|point| {
-        let (address, comment) = declared(&point.name).unwrap_or_default();
-        SignalFacts {
-            name: point.name.clone(),
-            of: point.declared().to_string(),
-            values: value_names(point.values.as_deref()),
-            bit: point.bit,
-            address,
-            comment,
-            operator: None,
-            from: None,
-        }
-    });
-    facts.collect()
+fn signal_facts(controller: &Controller, point: &Point, card: Card) -> SignalFacts {
+    let mut variables = controller.code.typed().variables.iter();
+    let variable = variables.find(|variable| variable.name == point.name);
+    SignalFacts {
+        name: point.name.clone(),
+        of: point.declared().to_string(),
+        values: value_names(point.values.as_deref()),
+        bit: point.bit,
+        address: variable.and_then(|variable| variable.address.clone()),
+        card: card.facts(point.of),
+        operator: None,
+        from: None,
+    }
 }
 
 /// A cycle; by default the newest.
@@ -342,7 +341,7 @@ mod tests {
             },
             declared: Elementary::Int.into(),
             title: None,
-            unit: Some("mm".to_owned()),
+            unit: None,
             confirm: true,
             group: None,
         };

@@ -234,7 +234,7 @@ pub(super) struct CrossReference {
 struct Line {
     name: String,
     address: Option<String>,
-    comment: Option<String>,
+    description: Option<String>,
     /// Rungs or lines, counted from 0.
     written: Vec<usize>,
     read: Vec<usize>,
@@ -262,7 +262,7 @@ pub(super) async fn cross_reference(
         let name = signal.name.to_string();
         Line {
             address: signal.address.as_ref().map(ToString::to_string),
-            comment: signal.description.clone(),
+            description: signal.description.clone(),
             written: written.get(&name).cloned().unwrap_or_default(),
             read: read.get(&name).cloned().unwrap_or_default(),
             name,
@@ -278,7 +278,7 @@ fn uses(known: &Known, program: ProgramId) -> CrossReference {
     let signals = uses.into_iter().map(|own| Line {
         name: own.name,
         address: own.address,
-        comment: own.description,
+        description: own.description,
         written: places(own.written),
         read: places(own.read),
     });

@@ -96,7 +96,8 @@ pub(super) struct Listed {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     values: BTreeMap<i64, String>,
     address: Option<String>,
-    comment: Option<String>,
+    /// The comment of its declaration.
+    description: Option<String>,
 }
 
 /// The names of the values of an enumeration, by number; of several names the first.
@@ -120,7 +121,7 @@ pub(super) async fn signals(State(app): State<Arc<App>>) -> Answered<Json<Vec<Li
             name: signal.name,
             of: signal.of,
             address: signal.address,
-            comment: signal.description,
+            description: signal.description,
         })
     });
     Ok(Json(listed.collect()))

@@ -54,6 +54,7 @@ pub(crate) fn chart(of: &syntax::Chart) -> Result<(Chart, Vec<usize>), String> {
         let transition = &of.transitions[*at];
         Transition {
             condition: print::expression(&transition.condition),
+            truth: None,
             from: found(&transition.from),
             to: found(&transition.to),
         }

@@ -12,6 +12,7 @@ use super::points::are_other_points;
 use super::settings::{ChangedSetting, Section, changed_sections};
 use crate::address::Addresses;
 use crate::alarm::{AlarmCondition, AlarmDeclaration};
+use crate::card::Card;
 use crate::cluster::{Cluster, Controller, PlantPlace, RemoteIo, Twin, Understudy};
 use crate::device::{Connection, FieldDevice, SerialLine};
 use crate::notify::Notify;
@@ -74,6 +75,7 @@ fn rest_of(cluster: &Cluster) -> Vec<Section> {
         plants,
         alarms,
         notify,
+        cards,
         // Links, and what the hash of the configuration is of.
         link: _,
         multicast: _,
@@ -96,6 +98,10 @@ fn rest_of(cluster: &Cluster) -> Vec<Section> {
     let period = cluster.agreement.schedule.period();
     sections.extend(alarms.iter().map(|alarm| of_alarm(alarm, cluster, period)));
     sections.extend(notify.iter().map(of_notify));
+    let of_programs = controllers.iter().zip(cards.iter());
+    sections.extend(of_programs.flat_map(|(controller, cards)| {
+        cards.iter().map(|(signal, card)| of_card(controller, signal, card))
+    }));
     sections
 }
 
@@ -235,6 +241,23 @@ fn of_alarm(alarm: &AlarmDeclaration, cluster: &Cluster, period: Duration) -> Se
     section.set("priority", priority.word());
     section.set("text", text);
     section.set("action", some(action.clone()));
+    section
+}
+
+fn of_card(controller: &Controller, signal: &str, card: &Card) -> Section {
+    let Card { unit, decimals, range, description, group } = card;
+    let interface = &controller.interface;
+    let point = interface.inputs.find(signal).or_else(|| interface.outputs.find(signal));
+    let limit =
+        |stored: Option<u64>| some(stored.zip(point).map(|(it, of)| of.declared().text(it)));
+    let (low, high) = range.unzip();
+    let mut section = Section::of(&format!("signal `{}.{signal}`", controller.name));
+    section.set("unit", some(unit.clone()));
+    section.set("decimals", some(decimals.map(|decimals| decimals.to_string())));
+    section.set("low", limit(low));
+    section.set("high", limit(high));
+    section.set("description", some(description.clone()));
+    section.set("group", some(group.clone()));
     section
 }
 

@@ -14,6 +14,7 @@ fn the_documentation_has_every_key_with_its_bounds() {
         &POINT,
         &OPERATOR_INPUT,
         &SIGNAL_INPUT,
+        &SIGNAL,
     ];
     for section in SECTIONS.into_iter().chain(parameters) {
         has_rows(page, section);

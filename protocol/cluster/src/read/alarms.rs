@@ -4,15 +4,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_executable::Interface;
 use understudy_text::Diagnostic;
-use understudy_text::spelling::suggestion;
 use understudy_text::tables::Constant;
 use understudy_typed::{Declared, Elementary, Point};
-use understudy_wire::ProgramId;
 
 use super::Member;
 use super::inputs::value;
+use super::names::find_signal;
 use crate::alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 use crate::fields::Placed;
 use crate::file::AlarmSection;
@@ -58,7 +56,7 @@ fn alarm(
 ) -> Option<AlarmDeclaration> {
     check_keys(section, diagnostics);
     let signal = section.signal.as_ref()?;
-    let (program, point, is_output) = find(signal, members, diagnostics)?;
+    let (program, point, is_output) = find_signal(signal, members, diagnostics)?;
     let condition = condition(section, point, diagnostics)?;
     let cycles = |delay: Duration| {
         let cycles = delay.as_nanos().div_ceil(period.as_nanos().max(1));
@@ -103,38 +101,6 @@ fn check_keys(section: &AlarmSection, diagnostics: &mut Vec<Diagnostic>) {
                 .with_help("it belongs to `above` and `below`; use `on_delay` and `off_delay`"),
         );
     }
-}
-
-/// The signal `controller.signal`, and whether it is an output.
-fn find<'m>(
-    signal: &Placed<String>,
-    members: &'m [Member],
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Option<(ProgramId, &'m Point, bool)> {
-    let Placed { value, span } = signal;
-    let mut unknown = |message: String, help: String| {
-        diagnostics.push(Diagnostic::error("U0209", message, span.clone()).with_help(help));
-        None
-    };
-    let Some((controller, name)) = value.split_once('.') else {
-        let message = format!("`{value}` names no signal of a controller");
-        let help = "write controller and signal with a dot between, such as \"tank.level\"";
-        return unknown(message, help.to_owned());
-    };
-    let Some(index) = members.iter().position(|member| member.name == controller) else {
-        let known = members.iter().map(|member| member.name.as_str());
-        let message = format!("there is no controller `{controller}`");
-        return unknown(message, suggestion(controller, known));
-    };
-    let (_, Interface { inputs, outputs }) = members[index].code.as_ref()?;
-    let input = inputs.find(name).map(|point| (point, false));
-    let found = input.or_else(|| outputs.find(name).map(|point| (point, true)));
-    let Some((point, is_output)) = found else {
-        let known = inputs.names().chain(outputs.names());
-        let message = format!("`{controller}` has no input or output `{name}`");
-        return unknown(message, suggestion(name, known));
-    };
-    Some((ProgramId(index as u8), point, is_output))
 }
 
 fn condition(

@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::ops::Range;
 
+use understudy_executable::Interface;
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
-use understudy_wire::{Via, ZENOH_PORT_OFFSET};
+use understudy_typed::Point;
+use understudy_wire::{ProgramId, Via, ZENOH_PORT_OFFSET};
 
 use super::Member;
 use crate::address::Addresses;
@@ -220,4 +222,36 @@ pub(crate) fn find_controller(
     }
     taken.insert(index, name.span.clone());
     Some(index)
+}
+
+/// The signal `controller.signal`, and whether it is an output.
+pub(crate) fn find_signal<'m>(
+    signal: &Placed<String>,
+    members: &'m [Member],
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<(ProgramId, &'m Point, bool)> {
+    let Placed { value, span } = signal;
+    let mut unknown = |message: String, help: String| {
+        diagnostics.push(Diagnostic::error("U0209", message, span.clone()).with_help(help));
+        None
+    };
+    let Some((controller, name)) = value.split_once('.') else {
+        let message = format!("`{value}` names no signal of a controller");
+        let help = "write controller and signal with a dot between, such as \"tank.level\"";
+        return unknown(message, help.to_owned());
+    };
+    let Some(index) = members.iter().position(|member| member.name == controller) else {
+        let known = members.iter().map(|member| member.name.as_str());
+        let message = format!("there is no controller `{controller}`");
+        return unknown(message, suggestion(controller, known));
+    };
+    let (_, Interface { inputs, outputs }) = members[index].code.as_ref()?;
+    let input = inputs.find(name).map(|point| (point, false));
+    let found = input.or_else(|| outputs.find(name).map(|point| (point, true)));
+    let Some((point, is_output)) = found else {
+        let known = inputs.names().chain(outputs.names());
+        let message = format!("`{controller}` has no input or output `{name}`");
+        return unknown(message, suggestion(name, known));
+    };
+    Some((ProgramId(index as u8), point, is_output))
 }

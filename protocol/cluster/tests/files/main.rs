@@ -1,6 +1,7 @@
 //! Cluster files as a whole: what loads, what is found, what the hash is of.
 
 mod alarms;
+mod cards;
 mod changed_settings;
 mod common;
 mod configuration;
