@@ -4,7 +4,7 @@
 
 mod project;
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 use understudy_structured_text::parser::{
     parse_body_at, parse_declarations_at, parse_statements_at,
 };

@@ -1,6 +1,6 @@
 //! Edges: their ends, and the elements that they are.
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 use understudy_ladder::{
     Block, BlockKind, Coil, Comparison, Contact, Element, MAXIMUM_PRESET_VALUE, Name, Relation,
 };

@@ -3,7 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 

@@ -1,6 +1,6 @@
 //! From elements to a [`Project`]: projects, units, variables, types.
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 

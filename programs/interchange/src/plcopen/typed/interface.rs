@@ -1,6 +1,6 @@
 //! Variables, types and initial values of a document.
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 use understudy_structured_text::parser::{Places, parse_expression_at, parse_initializer_at};
 use understudy_structured_text::syntax::{
     Class, Declaration, Expression, Initializer, Name, Retention, TypeDefinition, TypeKind,

@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{
     Argument, Body, Expression, ExpressionKind, File, Path, Statement, StatementKind,
