@@ -228,9 +228,13 @@ impl Picture {
                     self.line(&path, style);
                 }
             }
-            let lines = [text.to_owned()];
-            let (width, _) = text_size(&lines);
-            self.text((right + 14.0 + width / 2.0, y), &lines);
+            let (width, _) = text_size(&[text.to_owned()]);
+            let (x, base) = (right + 10.0, y + 4.0);
+            let _ = writeln!(
+                self.shapes,
+                "<text x=\"{x:.1}\" y=\"{base:.1}\" style=\"text-anchor: start\">{text}</text>"
+            );
+            self.reach((x, y), (width + 6.0, LINE / 2.0 + 4.0));
             y += LINE + 4.0;
         }
     }

@@ -62,7 +62,8 @@ fn texts(picture: &str) -> Vec<(&str, [f64; 2], [f64; 2])> {
         let (_, text) = line.split_once('>').expect("a text");
         let text = text.trim_end_matches("</text>");
         let half = [text.chars().count() as f64 * 3.0, 5.0];
-        (text, [number(line, "x"), number(line, "y") - 4.0], half)
+        let start = if line.contains("text-anchor: start") { half[0] } else { 0.0 };
+        (text, [number(line, "x") + start, number(line, "y") - 4.0], half)
     });
     texts.collect()
 }
