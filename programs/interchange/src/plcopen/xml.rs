@@ -6,9 +6,7 @@ use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
 pub(crate) use passage::Passage;
-pub(crate) use understudy_text::xml::{
-    Document, Node, child, children, elements, start_tag,
-};
+pub(crate) use understudy_text::xml::{Document, Node, child, children, elements, start_tag};
 
 /// A tree within the bounds.
 #[expect(clippy::result_large_err, reason = "once for a file")]
