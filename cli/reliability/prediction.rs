@@ -120,7 +120,7 @@ pub(crate) struct Arguments {
     /// Analyse the Markov chain in this file instead of a cluster
     #[arg(long, value_name = "FILE", conflicts_with_all = ["controllers", "mtbf", "mttr", "report"])]
     chain: Option<PathBuf>,
-    /// Output file for the Markov chain: .prism for PRISM and Storm, .drn for Storm; its questions go to a .props file beside it
+    /// Output file for the Markov chain: .prism for PRISM and Storm, .drn for Storm; its questions go to a .props file of the same name
     #[arg(long, value_name = "FILE")]
     export: Option<PathBuf>,
     /// Output folder for reliability.html, .json and .csv

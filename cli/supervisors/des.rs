@@ -164,7 +164,7 @@ enum Operation {
     Observer {
         /// Automaton
         file: PathBuf,
-        /// Names or labels of the unobservable events, beside those that a .gen or .wmod file declares unobservable
+        /// Names or labels of the unobservable events, in addition to those that a .gen or .wmod file declares unobservable
         #[arg(long, value_name = "EVENT", value_delimiter = ',')]
         hide: Vec<String>,
     },

@@ -1,4 +1,4 @@
-//! What the operations answer beside an automaton.
+//! Answers of operations that are not only an automaton.
 
 use std::time::Duration;
 

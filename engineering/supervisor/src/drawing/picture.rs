@@ -234,7 +234,7 @@ impl Picture {
                 self.shapes,
                 "<text x=\"{x:.1}\" y=\"{base:.1}\" style=\"text-anchor: start\">{text}</text>"
             );
-            self.reach((x, y), (width + 6.0, LINE / 2.0 + 4.0));
+            self.reach((x + width, y), (6.0, LINE / 2.0 + 4.0));
             y += LINE + 4.0;
         }
     }
