@@ -21,6 +21,10 @@ pub(crate) enum Kind {
     Net,
     Map,
     Ads,
+    /// A module of Supremica.
+    Module,
+    /// A generator of libFAUDES.
+    Generator,
     Program,
     /// Neither the name nor the content determines the kind.
     Unknown,
@@ -31,8 +35,9 @@ impl Kind {
     /// considered a cluster file.
     pub(crate) fn of(path: &Path, text: &str) -> Self {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        if ending == "ads" {
-            return Self::Ads;
+        let of_automata = [("ads", Self::Ads), ("wmod", Self::Module), ("gen", Self::Generator)];
+        if let Some((_, kind)) = of_automata.into_iter().find(|(known, _)| ending == *known) {
+            return kind;
         }
         if ending != "toml" {
             return match Format::of(&path.to_string_lossy(), text) {
@@ -62,6 +67,8 @@ impl Kind {
             Self::Net => "net",
             Self::Map => "map",
             Self::Ads => "ADS",
+            Self::Module => "module",
+            Self::Generator => "generator",
             Self::Program => "program",
             Self::Unknown => "unknown",
         }
@@ -77,6 +84,8 @@ impl Kind {
             Self::Net => "a Petri net",
             Self::Map => "a signal map",
             Self::Ads => "a TCT automaton",
+            Self::Module => "a module of Supremica",
+            Self::Generator => "a generator of libFAUDES",
             Self::Program => "a program",
             Self::Unknown => "a file of unknown format",
         }

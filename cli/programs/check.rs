@@ -20,7 +20,7 @@ use understudy_ladder::Program as Ladder;
 use understudy_scenarios::read;
 use understudy_supervisor::ladder::read_map;
 use understudy_supervisor::petri::read_net;
-use understudy_supervisor::read_ads;
+use understudy_supervisor::{read_ads, read_generator, read_module};
 use understudy_text::duration;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_typed::{Cost, Program};
@@ -50,7 +50,7 @@ The files of a TwinCAT project are checked as one program: several files, its .p
 cluster.toml in its folder. Ladder programs are also checked for rungs without effect, coils with conflicting values in one scan, and
 sequence steps that are passed in one scan; `understudy verify` shows example runs. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
-    /// Programs (.ladder, .st, .xml and others), TCT automata (.ADS), and clusters, plants, scenarios, models, nets, signal maps and projects (.toml)
+    /// Programs (.ladder, .st, .xml and others), automata of TCT (.ADS), Supremica (.wmod) and libFAUDES (.gen), and clusters, plants, scenarios, models, nets, signal maps and projects (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// The program to check in a text with several programs and no configuration
@@ -74,7 +74,7 @@ struct Result {
 #[derive(Serialize)]
 struct CheckedFile {
     name: String,
-    /// `ladder`, `cluster`, `plant`, `scenario`, `model`, `net`, `map`, `project`, `ADS` or `unknown`; null for an unreadable file.
+    /// `ladder`, `cluster`, `plant`, `scenario`, `model`, `net`, `map`, `project`, `ADS`, `module`, `generator` or `unknown`; null for an unreadable file.
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
@@ -170,6 +170,14 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             Kind::Ads => {
                 let diagnostics = read_ads(&text).diagnostics;
                 found.add_file(Kind::Ads, path, text, diagnostics);
+            }
+            Kind::Module => {
+                let diagnostics = read_module(&text).diagnostics;
+                found.add_file(Kind::Module, path, text, diagnostics);
+            }
+            Kind::Generator => {
+                let diagnostics = read_generator(&text).diagnostics;
+                found.add_file(Kind::Generator, path, text, diagnostics);
             }
             Kind::Net => {
                 let diagnostics = read_net(&text).diagnostics;

@@ -13,9 +13,9 @@ use understudy_campaigns::{options_of, set_unequal};
 use understudy_cluster::{Cluster, Overrides};
 use understudy_journal::time_name;
 use understudy_reliability::{
-    Answer as Calculated, Assessment, CommonCauseConvention, Hours, Options, Provenance,
-    ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, read_chain, report,
-    report_data,
+    Answer as Calculated, Assessment, Chain, CommonCauseConvention, ExportForm, Hours, Options,
+    Provenance, ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, export_chain,
+    export_properties, read_chain, report, report_data,
 };
 use understudy_text::Report;
 
@@ -35,6 +35,7 @@ Example:
   understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --box old*3=4000h,48h --shared power=200000h
   understudy reliability --controllers 4 --mtbf 10000h --mttr 24h --remote-io 20000h,24h --network 100000h,8h --twins 4 --networks 2
   understudy reliability --chain plant.chain --mission 1y
+  understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --mission 1000h --export cluster.prism
 
 Units of time: us, ms, s, min, h, d, y. Models and assumptions: docs/reference/reliability.md.")]
 pub(crate) struct Arguments {
@@ -119,13 +120,16 @@ pub(crate) struct Arguments {
     /// Analyse the Markov chain in this file instead of a cluster
     #[arg(long, value_name = "FILE", conflicts_with_all = ["controllers", "mtbf", "mttr", "report"])]
     chain: Option<PathBuf>,
+    /// Output file for the Markov chain: .prism for PRISM and Storm, .drn for Storm; its questions go to a .props file of the same name
+    #[arg(long, value_name = "FILE")]
+    export: Option<PathBuf>,
     /// Output folder for reliability.html, .json and .csv
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
 }
 
 /// Options that the model of shared spares does not have.
-const UNSHARED: [&str; 10] = [
+const UNSHARED: [&str; 11] = [
     "spares",
     "boxes",
     "shared",
@@ -135,6 +139,7 @@ const UNSHARED: [&str; 10] = [
     "beta",
     "mission",
     "chain",
+    "export",
     "report",
 ];
 
@@ -148,14 +153,14 @@ enum ConventionWord {
 
 pub(crate) fn run(arguments: &Arguments, console: &Console) -> Result<Answer, Answer> {
     match &arguments.chain {
-        Some(path) => of_chain(path, arguments.mission.as_deref(), console),
+        Some(path) => of_chain(path, arguments, console),
         None => of_cluster(arguments),
     }
 }
 
-fn of_chain(path: &Path, mission: Option<&str>, console: &Console) -> Result<Answer, Answer> {
+fn of_chain(path: &Path, arguments: &Arguments, console: &Console) -> Result<Answer, Answer> {
     let mut times = Times::default();
-    let mission = times.optional("mission", mission);
+    let mission = times.optional("mission", arguments.mission.as_deref());
     times.finish(Vec::new())?;
     let read = read_chain(&path.display().to_string(), files::text(path)?);
     let Some(chain) = read.chain else {
@@ -168,7 +173,28 @@ fn of_chain(path: &Path, mission: Option<&str>, console: &Console) -> Result<Ans
     } else {
         Answer::done(found.to_text(), json!(null))
     };
-    Ok(answer.with_reports(vec![read.report]))
+    exported(arguments, &chain, mission, answer.with_reports(vec![read.report]))
+}
+
+/// Writes the chain and its properties for a model checker, where that is asked for.
+fn exported(
+    arguments: &Arguments,
+    chain: &Chain,
+    mission: Option<Hours>,
+    answer: Answer,
+) -> Result<Answer, Answer> {
+    let Some(path) = &arguments.export else {
+        return Ok(answer);
+    };
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let Some(form) = ExportForm::of(&ending) else {
+        let message = format!("{}: chains are exported as .prism or .drn", path.display());
+        return Err(Answer::failed(Status::BadInput, "U0653", message));
+    };
+    let properties = path.with_extension("props");
+    files::write_output(path, &export_chain(chain, form))?;
+    files::write_output(&properties, &export_properties(mission))?;
+    Ok(answer.and_written(&properties).and_written(path))
 }
 
 fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
@@ -225,6 +251,14 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
         text.push_str(&write_report(folder, &options, cluster.as_ref(), None)?);
     }
     let answer = calculated(text, &found, reports);
+    let chain = || options.system().and_then(|system| system.chain());
+    let answer = match arguments.export {
+        Some(_) => {
+            let chain = chain().map_err(|errors| refused(&errors))?;
+            exported(arguments, &chain, options.mission, answer)?
+        }
+        None => answer,
+    };
     Ok(match &arguments.cluster {
         Some(cluster) => answer.and_next(&[&"allocate", cluster]),
         None => answer,

@@ -1,25 +1,25 @@
 //! `understudy des`: the operations of TCT.
 
-use std::path::PathBuf;
+mod answers;
+
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use understudy_supervisor::ladder::avalanche_events;
 use understudy_supervisor::operations::{
-    ControlData, Difference, allevents, condat, isomorph, lift, meet, minstate, mutex, nonconflict,
-    project, reachable, selfloop, supcon, sync, trim,
+    allevents, meet, minstate, mutex, observer, selfloop, sync, trim,
 };
-use understudy_supervisor::{
-    Automaton, AutomatonError, Bounds, Event, Label, Model, State, TooLarge, synthesis_findings,
-};
+use understudy_supervisor::{Automaton, AutomatonError, Bounds, Event, Label, State, TooLarge};
 
 use understudy_text::duration;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::supervisors::automata::{self, Sources, description, summary};
-use crate::supervisors::reduction::{BUDGET, reduced};
+use crate::supervisors::reduction::BUDGET;
+use answers::{check, compare, conflict, control_data, projected, reduce, supervisor};
 
 /// Apply the operations of TCT to automata
 #[derive(Debug, Args)]
@@ -29,13 +29,14 @@ Example:
   understudy des supcon PLANT.ADS examples/agv/Z1SPEC.ADS --lift -o SUPER.ADS
   understudy des condat PLANT.ADS SUPER.ADS --json
 
-Files are TCT automata (.ADS) or models of one automaton (.toml). Results are written as .ADS, .toml, .dot or .svg. supcon uses the meet
-with the specification: without --lift, events outside of its alphabet are forbidden. supreduce ends after its --budget, or at Ctrl-C,
+Files are automata of TCT (.ADS), of libFAUDES (.gen), or models: .toml, and modules of Supremica (.wmod). Results are written as .ADS,
+.toml, .wmod, .gen, .dot or .svg, by the ending of the output file. Events of .gen and .wmod files are the same where their names are, those
+of the others where their labels are. supcon uses the meet with the specification: without --lift, events outside of its alphabet are forbidden. supreduce ends after its --budget, or at Ctrl-C,
 with the smallest supervisor found.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     operation: Operation,
-    /// Output file for the resulting automaton: .ADS, .toml, .dot or .svg
+    /// Output file for the resulting automaton: .ADS, .toml, .wmod, .gen, .dot or .svg
     #[arg(long, short, value_name = "FILE", global = true)]
     output: Option<PathBuf>,
     /// Memory limit of a product
@@ -145,22 +146,37 @@ enum Operation {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
-    /// Natural projection that hides events
+    /// Natural projection that hides events, and its properties
     #[command(
         after_help = "Example:\n  understudy des project examples/agv/AGV1.ADS --hide 10 -o projected.ADS"
     )]
     Project {
+        /// Automaton
         file: PathBuf,
-        /// Labels of the hidden events
-        #[arg(long, value_name = "LABEL", value_delimiter = ',', required = true)]
-        hide: Vec<u32>,
+        /// Names or labels of the hidden events
+        #[arg(long, value_name = "EVENT", value_delimiter = ',', required = true)]
+        hide: Vec<String>,
     },
-    /// Convert an automaton file to another format
+    /// Observer: where an automaton can be after what was seen
     #[command(
-        after_help = "Example:\n  understudy des convert examples/agv/AGV1.ADS -o vehicle.svg"
+        after_help = "Example:\n  understudy des observer examples/agv/AGV1.ADS --hide 10 -o observer.svg"
+    )]
+    Observer {
+        /// Automaton
+        file: PathBuf,
+        /// Names or labels of the unobservable events, in addition to those that a .gen or .wmod file declares unobservable
+        #[arg(long, value_name = "EVENT", value_delimiter = ',')]
+        hide: Vec<String>,
+    },
+    /// Convert an automaton, or a whole model between .toml and .wmod
+    #[command(
+        after_help = "Example:\n  understudy des convert examples/agv/AGV1.ADS -o vehicle.svg\n  understudy des convert examples/small-factory/model.toml -o factory.wmod"
     )]
     #[command(visible_alias = "create")]
-    Convert { file: PathBuf },
+    Convert {
+        /// Automaton or model
+        file: PathBuf,
+    },
     /// Events that cause the avalanche effect in a ladder
     #[command(after_help = "Example:\n  understudy des avalanche examples/avalanche/TEST.ADS")]
     Avalanche { file: PathBuf },
@@ -175,19 +191,39 @@ fn pair(text: &str) -> Result<(State, State), String> {
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let bounds = Bounds { memory_bytes: arguments.memory.saturating_mul(1_000_000) };
+    if let (Operation::Convert { file }, Some(output)) = (&arguments.operation, &arguments.output)
+        && automata::is_model(file)
+        && automata::is_model(output)
+    {
+        return whole(file, output);
+    }
     let files = arguments.operation.files();
     let sources = match arguments.operation {
-        Operation::Check { .. } => automata::all(&files),
+        Operation::Check { .. }
+        | Operation::Sync { .. }
+        | Operation::Meet { .. }
+        | Operation::Nonconflict { .. } => automata::all(&files),
         _ => automata::one_each(&files),
     };
-    let Sources { read, reports } = sources?;
+    let Sources { read, reports, unobservable } = sources?;
     let parts: Vec<&Automaton> = read.iter().collect();
-    let answer = match arguments.operation.answer(&parts, bounds, console) {
+    let answer = match arguments.operation.answer(&parts, &unobservable, bounds, console) {
         Ok(Outcome::Answer(answer)) => answer,
         Ok(Outcome::Automaton(automaton, answer)) => made(arguments, &automaton, answer).into(),
         Err(error) => Answer::failed(Status::Failed, error.code(), error),
     };
     Ok(answer.with_reports(reports))
+}
+
+/// Writes a model in another format.
+fn whole(file: &Path, output: &Path) -> Result<Answer, Answer> {
+    let Sources { read: model, reports, .. } = automata::model(file)?;
+    let roles = [&model.plants, &model.specifications, &model.supervisors];
+    let all: Vec<&Automaton> = roles.into_iter().flatten().collect();
+    let text = all.iter().map(|one| summary(one)).collect::<Vec<_>>().join("\n");
+    let result = json!({ "automata": all.into_iter().map(description).collect::<Vec<_>>() });
+    automata::write_whole(output, &model)?;
+    Ok(Answer::done(text, result).and_written(output).with_reports(reports))
 }
 
 /// Adds the automaton to the answer, and writes it to the output file if one is given.
@@ -232,6 +268,7 @@ impl Operation {
             | Self::Allevents { file }
             | Self::Selfloop { file, .. }
             | Self::Project { file, .. }
+            | Self::Observer { file, .. }
             | Self::Convert { file }
             | Self::Avalanche { file } => vec![file],
             Self::Supcon { plant, specification, .. } => vec![plant, specification],
@@ -246,10 +283,13 @@ impl Operation {
     fn answer(
         &self,
         parts: &[&Automaton],
+        unobservable: &[Label],
         bounds: Bounds,
         console: &mut Console,
     ) -> Result<Outcome, TooLarge> {
-        let labels = |numbers: &[u32]| numbers.iter().map(|&number| Label::new(number)).collect();
+        let wrong = |error: AutomatonError| {
+            Outcome::Answer(Answer::failed(Status::BadInput, error.code(), error))
+        };
         Ok(match self {
             Self::Check { .. } => Outcome::Answer(check(parts, bounds)?),
             Self::Sync { .. } => Outcome::of(sync(parts, bounds)?),
@@ -262,8 +302,8 @@ impl Operation {
             Self::Isomorph { .. } => Outcome::Answer(compare(parts[0], parts[1])),
             Self::Allevents { .. } => Outcome::of(allevents(parts[0].alphabet())),
             Self::Selfloop { events, .. } => {
-                let labels: Vec<Label> = labels(events);
-                let events: Vec<Event> = labels.into_iter().map(Event::unnamed).collect();
+                let labels = events.iter().map(|&number| Label::new(number));
+                let events: Vec<Event> = labels.map(Event::unnamed).collect();
                 match selfloop(parts[0], &events) {
                     Ok(looped) => Outcome::of(looped),
                     Err(error) => {
@@ -272,16 +312,21 @@ impl Operation {
                 }
             }
             Self::Mutex { exclude, .. } => match no_such_state(parts, exclude) {
-                Some(error) => {
-                    Outcome::Answer(Answer::failed(Status::BadInput, error.code(), error))
-                }
+                Some(error) => wrong(error),
                 None => Outcome::of(mutex(parts[0], parts[1], exclude, bounds)?),
             },
             Self::Nonconflict { .. } => Outcome::Answer(conflict(parts, bounds)?),
-            Self::Project { hide, .. } => {
-                let hidden: Vec<Label> = labels(hide);
-                Outcome::of(project(parts[0], &hidden, bounds)?)
-            }
+            Self::Project { hide, .. } => match labels(parts[0], hide) {
+                Ok(hidden) => projected(parts[0], &hidden, bounds)?,
+                Err(error) => wrong(error),
+            },
+            Self::Observer { hide, .. } => match labels(parts[0], hide) {
+                Ok(mut hidden) => {
+                    hidden.extend(unobservable);
+                    Outcome::of(observer(parts[0], &hidden, bounds)?)
+                }
+                Err(error) => wrong(error),
+            },
             Self::Convert { .. } => Outcome::of(parts[0].clone()),
             Self::Avalanche { .. } => {
                 let events = avalanche_events(parts[0]);
@@ -301,6 +346,11 @@ impl Operation {
     }
 }
 
+/// The events of these names or labels.
+fn labels(automaton: &Automaton, events: &[String]) -> Result<Vec<Label>, AutomatonError> {
+    events.iter().map(|event| automaton.event(event)).collect()
+}
+
 /// First pair with an unknown state.
 fn no_such_state(parts: &[&Automaton], pairs: &[(State, State)]) -> Option<AutomatonError> {
     let sides = pairs.iter().flat_map(|&(left, right)| [(left, parts[0]), (right, parts[1])]);
@@ -318,182 +368,4 @@ fn word(automaton: &Automaton, labels: &[Label]) -> String {
 
 fn numbers(labels: &[Label]) -> Vec<u32> {
     labels.iter().map(|label| label.number()).collect()
-}
-
-fn check(parts: &[&Automaton], bounds: Bounds) -> Result<Answer, TooLarge> {
-    let mut lines = Vec::new();
-    let mut files = Vec::new();
-    for part in parts {
-        let unreachable = part.state_count() - reachable(part).state_count();
-        let blocking = nonconflict(&[part], bounds)?;
-        let mut line = summary(part);
-        if unreachable > 0 {
-            line.push_str(&format!("; {unreachable} unreachable states"));
-        }
-        if let Some(conflict) = &blocking {
-            line.push_str(&format!(
-                "; blocks in state {} after \"{}\"",
-                part.state_name(conflict.states[0]),
-                word(part, &conflict.word)
-            ));
-        }
-        lines.push(line);
-        let mut file = description(part);
-        file["unreachable"] = json!(unreachable);
-        file["nonblocking"] = json!(blocking.is_none());
-        files.push(file);
-    }
-    Ok(Answer::done(lines.join("\n"), json!({ "automata": files })))
-}
-
-fn supervisor(
-    plant: &Automaton,
-    specification: &Automaton,
-    lifted: bool,
-    bounds: Bounds,
-) -> Result<Outcome, TooLarge> {
-    let specification =
-        if lifted { lift(specification, plant.alphabet()) } else { specification.clone() };
-    let result = supcon(plant, &specification, bounds)?;
-    let model = Model {
-        alphabet: plant.alphabet().union([specification.alphabet()]),
-        plants: vec![plant.clone()],
-        specifications: vec![specification],
-        ..Model::default()
-    };
-    let findings = synthesis_findings(&model, &result);
-    let lines = findings.iter().map(|finding| format!("{}: {}\n", finding.code, finding.message));
-    let answer = Answer::done(
-        lines.collect::<String>(),
-        json!({
-            "explored_states": result.explored_states,
-            "findings": findings.iter().map(|finding| json!({
-                "code": finding.code,
-                "severity": finding.severity,
-                "message": finding.message,
-            })).collect::<Vec<_>>(),
-        }),
-    );
-    // EMPTY is a valid result of an operation.
-    Ok(Outcome::Automaton(result.supervisor, answer))
-}
-
-fn control_data(
-    plant: &Automaton,
-    supervisor: &Automaton,
-    bounds: Bounds,
-) -> Result<Answer, TooLarge> {
-    let data = condat(plant, supervisor, bounds)?;
-    let rows = data.table.iter();
-    let lines = rows.map(|(&state, events)| {
-        format!("{}: {}\n", supervisor.state_name(state), word(plant, events))
-    });
-    let text = format!(
-        "{}{} states disable events, {} pairs",
-        lines.collect::<String>(),
-        data.states_with_disablement(),
-        data.pairs()
-    );
-    let table =
-        data.table.iter().map(|(state, events)| (state.to_string(), json!(numbers(events))));
-    let result = json!({
-        "states_with_disablement": data.states_with_disablement(),
-        "pairs": data.pairs(),
-        "table": table.collect::<serde_json::Map<_, _>>(),
-    });
-    Ok(refusing(Answer::done(text, result), plant, supervisor, &data))
-}
-
-/// Adds the states in which a supervisor disables uncontrollable events.
-fn refusing(
-    mut answer: Answer,
-    plant: &Automaton,
-    supervisor: &Automaton,
-    data: &ControlData,
-) -> Answer {
-    for disabled in &data.uncontrollable {
-        let message = format!(
-            "in state {} the supervisor disables the uncontrollable event {}: it is not a supervisor of this plant",
-            supervisor.state_name(disabled.state),
-            plant.alphabet().name(disabled.event)
-        );
-        answer = answer.and_failure(Status::Failed, "U0846", message);
-    }
-    answer
-}
-
-/// Reduces a supervisor of this plant.
-fn reduce(
-    plant: &Automaton,
-    supervisor: &Automaton,
-    bounds: Bounds,
-    budget: Duration,
-    console: &mut Console,
-) -> Result<Outcome, TooLarge> {
-    let data = condat(plant, supervisor, bounds)?;
-    let answer = refusing(Answer::done("", json!({})), plant, supervisor, &data);
-    if !answer.failures.is_empty() {
-        return Ok(Outcome::Answer(answer));
-    }
-    Ok(match reduced(plant, supervisor, bounds, budget, console) {
-        Err(answer) => Outcome::Answer(answer),
-        Ok(reduced) => {
-            let result = json!({
-                "is_complete": reduced.warning.is_none(),
-                "lower_bound": reduced.lower_bound,
-            });
-            let answer = Answer::done(reduced.notes(), result);
-            Outcome::Automaton(reduced.supervisor, answer)
-        }
-    })
-}
-
-fn compare(left: &Automaton, right: &Automaton) -> Answer {
-    let difference = match isomorph(left, right) {
-        Ok(states) => {
-            let states: Vec<u32> = states.iter().map(|state| state.number()).collect();
-            let result = json!({ "isomorphic": true, "states": states });
-            return Answer::done("isomorphic", result);
-        }
-        Err(difference) => difference,
-    };
-    let said = |word_of: &[Label]| format!("\"{}\"", word(left, word_of));
-    let reason = match &difference {
-        Difference::StateCounts(one, two) => format!("{one} states and {two} states"),
-        Difference::Enabled { word, event } => format!(
-            "after {} only one of them allows {}",
-            said(word),
-            left.alphabet().union([right.alphabet()]).name(*event)
-        ),
-        Difference::Marked { word } => format!("after {} only one of them is marked", said(word)),
-        Difference::Merged { word, other } => {
-            format!("{} and {} lead to the same state in only one of them", said(word), said(other))
-        }
-        Difference::Unreachable { name, reached } => {
-            format!(
-                "only {reached} states of {name} are reachable; isomorph compares reachable automata"
-            )
-        }
-    };
-    let result = json!({ "isomorphic": false, "reason": reason });
-    Answer::done(format!("not identical: {reason}"), result).with_status(Status::Failed)
-}
-
-fn conflict(parts: &[&Automaton], bounds: Bounds) -> Result<Answer, TooLarge> {
-    let Some(conflict) = nonconflict(parts, bounds)? else {
-        return Ok(Answer::done("nonconflicting", json!({ "nonconflicting": true })));
-    };
-    let names = parts[0].alphabet().union(parts[1..].iter().map(|part| part.alphabet()));
-    let words: Vec<String> = conflict.word.iter().map(|&label| names.name(label)).collect();
-    let states = parts.iter().zip(&conflict.states);
-    let states: Vec<String> = states
-        .map(|(part, &state)| format!("{} in {}", part.name(), part.state_name(state)))
-        .collect();
-    let text = format!(
-        "conflicting: after \"{}\" not all can reach marked states ({})",
-        words.join(" "),
-        states.join(", ")
-    );
-    let result = json!({ "nonconflicting": false, "word": numbers(&conflict.word) });
-    Ok(Answer::done(text, result).with_status(Status::Failed))
 }

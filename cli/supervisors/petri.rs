@@ -13,7 +13,7 @@ use understudy_supervisor::petri::{
 use understudy_supervisor::proof::{
     Finding, HybridProof, HybridVerdict, ProofSettings, hybrid_findings, prove_hybrid,
 };
-use understudy_supervisor::{Automaton, Model, write_model};
+use understudy_supervisor::{Alphabet, Automaton, Model};
 use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
@@ -52,7 +52,7 @@ enum Operation {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
     },
-    /// Reachability graph as an automaton: .ADS, .toml, .dot or .svg
+    /// Reachability graph as an automaton: .ADS, .toml, .wmod, .gen, .dot or .svg
     #[command(
         after_help = "Example:\n  understudy petri automaton examples/assembly-cell/net.toml -o net.ADS"
     )]
@@ -75,7 +75,7 @@ enum Operation {
     Ladder {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
-        /// Supervisors: TCT automata (.ADS) or models with supervisors (.toml)
+        /// Supervisors: automata (.ADS, .gen) or models with supervisors (.toml, .wmod)
         #[arg(long = "supervisor", value_name = "FILE", num_args = 1..)]
         supervisors: Vec<PathBuf>,
     },
@@ -86,7 +86,7 @@ enum Operation {
     Draw {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
-        /// Supervisors, as nets with inhibitor arcs: TCT automata (.ADS) or models with supervisors (.toml)
+        /// Supervisors, as nets with inhibitor arcs: automata (.ADS, .gen) or models with supervisors (.toml, .wmod)
         #[arg(long = "supervisor", value_name = "FILE", num_args = 1..)]
         supervisors: Vec<PathBuf>,
         /// The nets of the supervisors without the plant
@@ -198,7 +198,7 @@ fn automaton(file: &NetFile, limit: usize, output: Option<&Path>) -> Result<Answ
             plants: vec![made],
             ..Model::default()
         };
-        files::write(path, &write_model(&model))?;
+        automata::write_whole(path, &model)?;
     } else {
         automata::write(path, &made)?;
     }
@@ -233,8 +233,7 @@ fn drawn(
     form: Form,
     output: Option<&Path>,
 ) -> Result<Answer, Answer> {
-    let named = supervisors(paths)?.into_iter();
-    let named: Vec<Automaton> = named.map(|one| one.with_event_names(&file.events)).collect();
+    let named = supervisors(paths, &file.events)?;
     let plant = (!auto_net).then_some(&file.net);
     let net = hybrid_net(plant, &named, &file.events);
     let net = net.map_err(|error| failed(error.code(), error))?;
@@ -254,8 +253,7 @@ fn ladder(
     mut report: Report,
     console: &mut Console,
 ) -> Result<Answer, Answer> {
-    let named = supervisors(paths)?.into_iter();
-    let named: Vec<Automaton> = named.map(|one| one.with_event_names(&file.events)).collect();
+    let named = supervisors(paths, &file.events)?;
     let made = to_ladder(&file.net, &named, limit);
     let mut made = match made {
         Ok(made) => made,
@@ -291,23 +289,27 @@ fn ladder(
     Ok(answer.with_reports(vec![report]))
 }
 
-fn supervisors(paths: &[PathBuf]) -> Result<Vec<Automaton>, Answer> {
-    let mut all = Vec::new();
+/// The supervisors of files, with the events of a net.
+fn supervisors(paths: &[PathBuf], events: &Alphabet) -> Result<Vec<Automaton>, Answer> {
+    let mut files = Vec::new();
     for path in paths {
-        if automata::is_model(path) {
-            let Sources { read, reports } = automata::model(path)?;
+        let read = if automata::is_model(path) {
+            let Sources { read, reports, .. } = automata::model(path)?;
             if read.supervisors.is_empty() {
                 let path = path.display();
                 let message = format!("{path} has no supervisor; `understudy synth` creates them");
                 let answer = Answer::failed(Status::BadInput, "U0651", message);
                 return Err(answer.with_reports(reports));
             }
-            all.extend(read.supervisors);
+            read.supervisors
         } else {
-            all.extend(automata::all(&[path])?.read);
-        }
+            automata::all(&[path])?.read
+        };
+        files.push((path.as_path(), read));
     }
-    Ok(all)
+    automata::agree(events, files.iter_mut().map(|(path, read)| (*path, read.iter_mut())))?;
+    let all = files.into_iter().flat_map(|(_, read)| read);
+    Ok(all.map(|one| one.with_event_names(events)).collect())
 }
 
 fn proved(

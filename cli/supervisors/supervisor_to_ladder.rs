@@ -12,7 +12,7 @@ use understudy_supervisor::proof::{
     Counterexample, Deviation, Finding, FindingSeverity, ProofSettings, Proving, Verdict, findings,
     prove_with_progress,
 };
-use understudy_supervisor::{Automaton, Label, Model, Signal};
+use understudy_supervisor::{Alphabet, Automaton, Label, Model, Signal};
 use understudy_text::{Diagnostic, Report};
 
 use crate::answer::{Answer, Status};
@@ -28,11 +28,11 @@ Example:
   understudy supervisor-to-ladder examples/motivating-example/supervisor.ADS --io examples/motivating-example/map.toml --mode manual -o motivating.ladder
   understudy supervisor-to-ladder examples/avalanche/figure-7.toml --one-event queue --priority d,f
 
-The supervisor is a TCT automaton (.ADS) or a model (.toml) with supervisors. A reduced supervisor does not track the state of its plant;
+The supervisor is a TCT automaton (.ADS), a generator (.gen) or a model (.toml, .wmod) with supervisors. A reduced supervisor does not track the state of its plant;
 supply the plants by --plant. Findings about the supervisor are warnings, unless no ladder program can implement it. The ladder is written
 only if it is proved to do what the supervisor allows and nothing else, and no finding is an error.")]
 pub(crate) struct Arguments {
-    /// Supervisor: a TCT automaton (.ADS) or a model (.toml)
+    /// Supervisor: a TCT automaton (.ADS), a generator (.gen) or a model (.toml, .wmod)
     #[arg(value_name = "SUPERVISOR")]
     supervisor: PathBuf,
     /// Signal map from events to signals, overrides the model; an event without an entry gets a signal of its own that is 1 for
@@ -88,11 +88,21 @@ impl From<ModeWord> for Mode {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let supervisor = source(&arguments.supervisor)?;
+    let mut sources = Vec::new();
+    for path in [&arguments.supervisor].into_iter().chain(&arguments.plants) {
+        sources.push((path.as_path(), source(path)?));
+    }
+    let automata = sources.iter_mut().map(|(path, Source { model, .. })| {
+        (*path, model.plants.iter_mut().chain(&mut model.supervisors))
+    });
+    automata::agree(&Alphabet::default(), automata)?;
+    let mut sources = sources.into_iter();
+    let Some((_, supervisor)) = sources.next() else {
+        return Ok(Answer::done("", json!({})));
+    };
     let mut plants = Vec::new();
     let mut signals = supervisor.model.signals.clone();
-    for path in &arguments.plants {
-        let plant = source(path)?.model;
+    for (path, Source { model: plant, .. }) in sources {
         signals.extend(plant.signals.into_iter().map(Signal::without_place));
         plants.extend(some(path, plant.plants, "plant")?);
     }
@@ -155,10 +165,10 @@ struct Source {
 
 fn source(path: &Path) -> Result<Source, Answer> {
     if automata::is_model(path) {
-        let Sources { read, mut reports } = automata::model(path)?;
+        let Sources { read, mut reports, .. } = automata::model(path)?;
         return Ok(Source { model: read, report: reports.swap_remove(0) });
     }
-    let Sources { read, mut reports } = automata::all(&[&path.to_owned()])?;
+    let Sources { read, mut reports, .. } = automata::all(&[&path.to_owned()])?;
     Ok(Source {
         model: Model { plants: read.clone(), supervisors: read, ..Model::default() },
         report: reports.swap_remove(0),

@@ -9,13 +9,12 @@ use understudy_supervisor::operations::{minstate, sync};
 use understudy_supervisor::{
     Automaton, Bounds, Finding, Model, SymbolicBounds, Together, empty_finding, model_findings,
     modular_findings, specification_findings, synthesis_findings, synthesise, synthesise_modularly,
-    synthesise_symbolically, write_model,
+    synthesise_symbolically,
 };
 use understudy_text::{Severity, duration};
 
 use crate::answer::{Answer, Failure, Status};
 use crate::console::Console;
-use crate::files;
 use crate::supervisors::automata::{self, Sources, description, summary};
 use crate::supervisors::reduction;
 
@@ -32,8 +31,8 @@ The supervisor is nonblocking. Specifications restrict only the events of their 
 sequence of events that shows them. The symbolic engine counts and decides without listing states. The modular engine synthesises one
 supervisor for each specification and reports conflicts. The engine `specified` takes the specifications themselves as supervisors.")]
 pub(crate) struct Arguments {
-    /// Model of plants and specifications
-    #[arg(value_name = "MODEL.toml")]
+    /// Model of plants and specifications: .toml, or a module of Supremica (.wmod)
+    #[arg(value_name = "MODEL")]
     model: PathBuf,
     /// Method of synthesis
     #[arg(long, value_enum, default_value = "explicit")]
@@ -50,7 +49,7 @@ pub(crate) struct Arguments {
     /// Name of the supervisor, or prefix of the names of several; default: SUPER
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// Output file: .toml for the model with its supervisors; .ADS, .dot or .svg for a single supervisor
+    /// Output file: .toml or .wmod for the model with its supervisors; .ADS, .gen, .dot or .svg for a single supervisor
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Memory limit of a product
@@ -71,7 +70,7 @@ enum Engine {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let Sources { read: model, reports } = automata::model(&arguments.model)?;
+    let Sources { read: model, reports, .. } = automata::model(&arguments.model)?;
     let findings = model_findings(&model);
     let answer = if findings.iter().any(|finding| finding.severity == Severity::Error) {
         with_findings(Answer::done("", json!({})), &findings, Status::BadInput)
@@ -292,12 +291,12 @@ fn written(
     match supervisors.as_slice() {
         _ if automata::is_model(path) => {
             let model = Model { supervisors, ..model };
-            files::write(path, &write_model(&model))?;
+            automata::write_whole(path, &model)?;
         }
         [only] => automata::write(path, only)?,
         _ => {
             let message = format!(
-                "{}: {} supervisors require a .toml file",
+                "{}: {} supervisors require a .toml or .wmod file",
                 path.display(),
                 supervisors.len()
             );

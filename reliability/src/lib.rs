@@ -23,6 +23,7 @@ mod dense;
 mod drawing;
 mod elimination;
 mod error;
+mod export;
 mod extended;
 mod figures;
 mod format;
@@ -48,6 +49,7 @@ pub use chain_answer::{ByState, ChainAnswer, ChainMission, StateAnswer, answer_c
 pub use copies::Survival;
 pub use elimination::TimeToFailure;
 pub use error::ReliabilityError;
+pub use export::{ExportForm, export_chain, export_properties};
 pub use figures::{FigurePoint, PerUnit, figures_5_and_6};
 pub use format::{MAXIMUM_TEXT_BYTES, ReadChain, read_chain};
 pub use measured::{

@@ -59,6 +59,52 @@ fn from_machines_to_a_reduced_supervisor_as_in_tct() {
 }
 
 #[test]
+fn a_model_goes_to_supremica_and_back_with_the_same_supervisor() {
+    let folder = empty_folder("supremica");
+    let file = |name: &str| folder.join(name).display().to_string();
+    let (module, supervised) = (file("factory.wmod"), file("supervised.wmod"));
+    let made = des(&["convert", MODEL, "-o", &module]);
+    assert_eq!(made.status, 0, "{}", made.errors);
+    let synthesised = understudy(&["synth", &module, "--json", "-o", &supervised]);
+    assert_eq!(counts(&synthesised), (12, 24));
+    let checked = des(&["check", &supervised]).json();
+    assert_eq!(checked["result"]["automata"].as_array().map(Vec::len), Some(5));
+    let ladder = understudy(&["supervisor-to-ladder", &supervised, "--plant", &module]);
+    assert_eq!(ladder.status, 0, "{}", ladder.errors);
+    let several = des(&["trim", &module]);
+    assert_eq!(several.json()["failures"][0]["code"], "U0652", "{}", several.output);
+}
+
+#[test]
+fn generators_of_libfaudes_meet_by_the_names_of_their_events() {
+    let folder = empty_folder("libfaudes");
+    let file = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    // Each file alone would give its events the labels 1 and 0.
+    let machine = |number: u32| {
+        format!(
+            "<Generator> m{number} <Alphabet> start{number} +C+ done{number} </Alphabet> <States> 1 2 </States> <TransRel> 1 start{number} 2 2 done{number} 1 </TransRel> <InitStates> 1 </InitStates> <MarkedStates> 1 </MarkedStates> </Generator>"
+        )
+    };
+    let buffer = "<Generator> buffer <Alphabet> start2 +C+ done1 </Alphabet> <States> 1 2 </States> <TransRel> 1 done1 2 2 start2 1 </TransRel> <InitStates> 1 </InitStates> <MarkedStates> 1 </MarkedStates> </Generator>";
+    let (one, two) = (file("one.gen", &machine(1)), file("two.gen", &machine(2)));
+    let buffer = file("buffer.gen", buffer);
+    let plant = folder.join("plant.gen").display().to_string();
+    assert_eq!(counts(&des(&["sync", &one, &two, "-o", &plant])), (4, 8));
+    assert_eq!(counts(&des(&["supcon", &plant, &buffer, "--lift"])), (6, 8));
+    let projected = des(&["project", &plant, "--hide", "done1"]).json();
+    assert_eq!(projected["result"]["is_observer"]["holds"], json!(true));
+    assert_eq!(projected["result"]["is_locally_control_consistent"]["holds"], json!(true));
+    let unknown = des(&["observer", &plant, "--hide", "done3"]).json();
+    assert_eq!(unknown["failures"][0]["code"], "U0809");
+    let two = file("two.gen", &machine(2).replace(" +C+", "").replace("start2", "start1"));
+    assert_eq!(des(&["sync", &one, &two]).json()["failures"][0]["code"], "U0839");
+}
+
+#[test]
 fn the_events_of_the_avalanche_effect() {
     let answer = des(&["avalanche", "examples/avalanche/TEST.ADS"]).json();
     assert_eq!(answer["result"]["events"], json!([1, 2, 3]));

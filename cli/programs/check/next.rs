@@ -55,7 +55,7 @@ pub(super) fn after_check(answer: Answer, program: Option<&str>, files: &Files<'
         },
         (None, None) => {
             let command = |kind| match kind {
-                Kind::Model => Some("synth"),
+                Kind::Model | Kind::Module => Some("synth"),
                 Kind::Project => Some("reconfigure"),
                 _ => None,
             };

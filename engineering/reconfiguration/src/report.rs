@@ -183,7 +183,7 @@ impl Outcome {
     /// For a person.
     pub fn report(&self, name: &str) -> String {
         let controller = &self.controller;
-        let mut text = format!("# What {name} can do while input channels are failed\n\n");
+        let mut text = self.beginning(name);
         let explored = match self.joint_states {
             Some(joint) => format!("explored against its plant ({joint} states of both together)"),
             None => "learnt from its records".to_owned(),
@@ -234,7 +234,7 @@ impl Outcome {
             "Full control needs: {}.\n",
             if minimum.is_empty() { "no channel".to_owned() } else { minimum.join(", ") }
         );
-        text.push_str("| no. | state | outputs on |\n|---|---|---|\n");
+        text.push_str("## States\n\n| no. | state | outputs on |\n|---|---|---|\n");
         for (place, state) in controller.states().iter().enumerate() {
             let _ = writeln!(
                 text,
@@ -275,6 +275,21 @@ impl Outcome {
             }
             text.push('\n');
         }
+        text
+    }
+
+    /// The title, what the report answers, and how its states and events are written.
+    fn beginning(&self, name: &str) -> String {
+        let signals = &self.controller.signals;
+        let (inputs, outputs) = (signals.inputs.join(" "), signals.outputs.join(" "));
+        let example = self.controller.state_name(0);
+        let mut text = format!(
+            "# What {name} can do while input channels are failed\n\nFor each input channel: in which states of the program its failure matters, what stops, what continues, and whether control returns by itself after the repair.\n\nA state such as `{example}` is the inputs and the outputs of a scan, 1 for on: the inputs ({inputs}), then the outputs ({outputs})."
+        );
+        if self.controller.states().iter().any(|state| state.sibling > 0) {
+            text.push_str(" States with the same values and different memory end with `'1`, `'2`.");
+        }
+        text.push_str(" The text calls them by the numbers of the table. `x+` is the event that input x goes on, `x-` that it goes off.\n\n");
         text
     }
 

@@ -8,6 +8,8 @@ use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
+use understudy_text::spelling;
+
 use crate::alphabet::{Alphabet, Event, Label};
 
 /// A state, by its number.
@@ -93,6 +95,16 @@ pub enum AutomatonError {
         /// How many are possible.
         limit: usize,
     },
+    /// An event that is not in the alphabet.
+    #[error("U0809: {automaton} has no event `{event}`{hint}")]
+    NoSuchEvent {
+        /// The name or the number that was given.
+        event: String,
+        /// The automaton.
+        automaton: String,
+        /// The nearest name, as a question, or nothing.
+        hint: String,
+    },
     /// A list of state names that does not fit the states.
     #[error("U0804: {names} names for {states} states")]
     NamesDoNotFit {
@@ -111,7 +123,46 @@ impl AutomatonError {
             Self::Nondeterministic { .. } => "U0802",
             Self::TooLarge { .. } => "U0803",
             Self::NamesDoNotFit { .. } => "U0804",
+            Self::NoSuchEvent { .. } => "U0809",
         }
+    }
+}
+
+/// The parts of an automaton whose states have names, the initial one anywhere among them.
+pub(crate) struct Named {
+    pub(crate) name: String,
+    pub(crate) events: Vec<Event>,
+    pub(crate) states: Vec<String>,
+    pub(crate) initial: usize,
+    pub(crate) marked: Vec<bool>,
+    pub(crate) transitions: Vec<Transition>,
+}
+
+impl Named {
+    /// The automaton, with the initial state as state 0. `number` is the name that an unnamed state has in the format: where all
+    /// states have these, they have no names.
+    ///
+    /// # Errors
+    /// As of [`Automaton::new`].
+    pub(crate) fn automaton(
+        mut self,
+        number: impl Fn(usize) -> String,
+    ) -> Result<Automaton, AutomatonError> {
+        let initial = self.initial as u32;
+        let swap = |state: State| match state.number() {
+            0 => State::new(initial),
+            number if number == initial => State::INITIAL,
+            _ => state,
+        };
+        for transition in &mut self.transitions {
+            transition.source = swap(transition.source);
+            transition.target = swap(transition.target);
+        }
+        self.states.swap(0, self.initial);
+        self.marked.swap(0, self.initial);
+        let has_names = self.states.iter().enumerate().any(|(place, name)| *name != number(place));
+        let automaton = Automaton::new(self.name, self.events, self.marked, self.transitions)?;
+        Ok(if has_names { automaton.named_states(self.states) } else { automaton })
     }
 }
 
@@ -185,6 +236,24 @@ impl Automaton {
         Ok(Self::from_parts(name.into(), alphabet, marked, first, edges))
     }
 
+    /// The same with another label for each event, in the order of its alphabet.
+    pub(crate) fn relabelled(&self, events: Vec<Event>) -> Self {
+        let transitions = self.states().flat_map(|source| {
+            let of = |edge: &Edge| Transition {
+                source,
+                label: events[edge.event as usize].label,
+                target: edge.target,
+            };
+            self.edges(source).iter().map(of).collect::<Vec<_>>()
+        });
+        let transitions: Vec<Transition> = transitions.collect();
+        let made = Self::new(self.name.clone(), events, self.marked.clone(), transitions);
+        // The caller knows that the labels are different ones.
+        let mut made = made.unwrap_or_else(|_| self.clone());
+        made.state_names.clone_from(&self.state_names);
+        made
+    }
+
     /// TCT's EMPTY: no state, and the alphabet of what was asked for.
     pub fn empty(name: impl Into<String>, alphabet: Alphabet) -> Self {
         Self::from_parts(name.into(), alphabet, Vec::new(), vec![0], Vec::new())
@@ -253,6 +322,26 @@ impl Automaton {
     /// Its name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The event of that name or number.
+    ///
+    /// # Errors
+    /// U0809: there is none in its alphabet.
+    pub fn event(&self, name: &str) -> Result<Label, AutomatonError> {
+        let events = self.alphabet.events();
+        let number = name.parse().map(Label::new);
+        let labels = number.into_iter().filter(|label| self.alphabet.contains(*label));
+        let mut named = events.iter().filter(|event| event.name == name).map(|event| event.label);
+        named.next().or_else(|| labels.into_iter().next()).ok_or_else(|| {
+            let names = events.iter().map(|event| event.name.as_str());
+            let hint = spelling::question(name, names).map(|hint| format!(": {hint}"));
+            AutomatonError::NoSuchEvent {
+                event: name.to_owned(),
+                automaton: self.name.clone(),
+                hint: hint.unwrap_or_default(),
+            }
+        })
     }
 
     /// Σ.

@@ -1,7 +1,7 @@
 //! Automata as graphs: for Graphviz, and as a picture.
 //!
-//! A double circle is a marked state, and transitions of uncontrollable events are dashed. Events that lead from one state to
-//! one other share an arrow. In the picture a state stands in the column of its distance from the initial one, and within it
+//! An arrow from nowhere leads to the initial state, a double circle is a marked state, and transitions of uncontrollable events are
+//! dashed; the legend of the picture says so. Events that lead from one state to one other share an arrow. In the picture a state stands in the column of its distance from the initial one, and within it
 //! near the states that lead to it.
 
 mod labels;
@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 use crate::automaton::{Automaton, State};
 
 pub(crate) use layout::{Graph, lay_out};
-pub(crate) use picture::{LINE, Picture, Shape, Style, middle, text_size};
+pub(crate) use picture::{LINE, Picture, Shape, Sign, Style, middle, text_size};
 
 /// Larger pictures are illegible.
 const MAXIMUM_DRAWN: usize = 400;
@@ -73,7 +73,7 @@ pub fn draw_dot(automaton: &Automaton) -> String {
     text
 }
 
-/// A picture. The initial state is the shaded one.
+/// A picture with a legend. The initial state is the shaded one with an arrow from nowhere.
 ///
 /// # Errors
 /// It is too large to be read.
@@ -141,6 +141,12 @@ pub fn draw_automaton_svg(automaton: &Automaton) -> Result<String, TooLargeToDra
         }
         picture.arrow((place, shape(from)), &bends, (goal, shape(to)), style, label);
     }
+    if let Some(initial) = automaton.initial() {
+        let (x, y) = layout.nodes[initial.index()];
+        let (rx, ry) = shapes[initial.index()];
+        let from = ((x - rx - INITIAL, y), Shape::Ellipse(1.0, 1.0));
+        picture.arrow(from, &[], ((x, y), Shape::Ellipse(rx, ry)), Style::default(), &[]);
+    }
     for state in automaton.states() {
         let place = layout.nodes[state.index()];
         let (rx, ry) = shapes[state.index()];
@@ -151,8 +157,28 @@ pub fn draw_automaton_svg(automaton: &Automaton) -> Result<String, TooLargeToDra
         }
         picture.text(place, std::slice::from_ref(&names[state.index()]));
     }
+    picture.legend(legend(automaton));
     Ok(picture.finish())
 }
+
+/// The signs that occur in the picture of an automaton.
+fn legend(automaton: &Automaton) -> Vec<(Sign, &'static str)> {
+    let has = |controllable: bool| {
+        automaton.transitions().any(|step| step.label.is_controllable() == controllable)
+    };
+    let dashed = Style { dashed: true, ..Style::default() };
+    let signs = [
+        (automaton.initial().is_some(), Sign::Initial, "initial state"),
+        (automaton.marked().next().is_some(), Sign::Marked, "marked state"),
+        (has(true), Sign::Arrow(Style::default()), "controllable event"),
+        (has(false), Sign::Arrow(dashed), "uncontrollable event"),
+    ];
+    let occurring = signs.into_iter().filter(|(occurs, ..)| *occurs);
+    occurring.map(|(_, sign, text)| (sign, text)).collect()
+}
+
+/// The length of the arrow to the initial state, in pixels.
+const INITIAL: f64 = 34.0;
 
 /// The smallest radius of a state, and the height of a loop, in pixels.
 const RADIUS: f64 = 20.0;

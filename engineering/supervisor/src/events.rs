@@ -11,6 +11,7 @@ use understudy_text::Diagnostic;
 use crate::ads::MAXIMUM_LABEL;
 use crate::alphabet::{Alphabet, Event, Label};
 use crate::form::{Form, Place, Word};
+use crate::labels::FreeLabels;
 use crate::ladder::When;
 use crate::model::Signal;
 
@@ -57,7 +58,7 @@ impl Events {
         for event in others.events() {
             events.labels.insert(event.name.clone(), event.label);
         }
-        let mut next = [0, 1];
+        let mut free = FreeLabels::default();
         for event in declared {
             let known = events.labels.get(&event.name).copied();
             if let Some(known) = known
@@ -68,12 +69,9 @@ impl Events {
                 form.error("U0827", message, event.place);
             }
             let label = event.label.or(known.map(Label::number)).unwrap_or_else(|| {
-                let next = &mut next[usize::from(event.controllable)];
-                while taken.contains_key(next) || others.contains(Label::new(*next)) {
-                    *next += 2;
-                }
-                *next += 2;
-                *next - 2
+                let is_taken =
+                    |number| taken.contains_key(&number) || others.contains(Label::new(number));
+                free.take(event.controllable, is_taken).number()
             });
             let label = Label::new(label);
             events.signals.extend(event.signal.map(|signal| Signal {

@@ -1,7 +1,7 @@
 //! Supervisors: from a plant and a specification to the automaton that keeps it, after Ramadge and Wonham, and to its ladder.
 //!
 //! An [`Automaton`] models what a plant can do or what it may do. [`read_ads`] and [`write_ads`] speak TCT's format, [`read_model`]
-//! and [`write_model`] our own. [`operations`] are TCT's. [`synthesise`] lists states, [`synthesise_symbolically`] holds sets of
+//! and [`write_model`] our own, [`foreign`] those of Supremica and libFAUDES. [`operations`] are TCT's. [`synthesise`] lists states, [`synthesise_symbolically`] holds sets of
 //! them, [`synthesise_modularly`] makes a supervisor for each specification; all three are compared on every model that fits.
 //! [`ladder`] turns a supervisor into a program, [`proof`] proves it, [`petri`] does the same for automation Petri nets.
 
@@ -12,9 +12,11 @@ mod drawing;
 mod events;
 mod explicit;
 mod findings;
+pub mod foreign;
 mod form;
 mod format;
 mod kind;
+mod labels;
 pub mod ladder;
 pub mod model;
 mod modular;
@@ -34,7 +36,9 @@ pub use findings::{
     Finding, empty_finding, model_findings, modular_findings, specification_findings,
     synthesis_findings,
 };
+pub use foreign::{ReadForeign, read_generator, read_module, write_generator, write_module};
 pub use kind::FileKind;
+pub use labels::{EventSource, EventsDisagree, agree_on_events};
 pub use model::{Model, ReadModel, Signal, read_model, write_model};
 pub use modular::{LocalSupervisor, ModularSupervisor, Together, synthesise_modularly};
 pub use schema::{map_schema, model_schema, net_schema};

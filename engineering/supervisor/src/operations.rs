@@ -12,6 +12,8 @@
 //! | [`fewest_states`] | a number of states that no such supervisor has fewer than |
 //! | [`compare_effects`] | where two supervisors have different effects on a plant |
 //! | [`minstate`] | the fewest states with the same languages |
+//! | [`observer`] | where an automaton may be after what was seen |
+//! | [`abstraction`] | what a projection keeps: observer property, control consistency |
 //! | [`isomorph`] | whether two automata are one but for the numbers |
 //! | [`allevents`], [`mutex`], [`nonconflict`], [`project`] | as their names say |
 //!
@@ -20,6 +22,7 @@
 //! [`synthesise`](crate::synthesise), which does); and an alphabet holds also the events that only unreachable states have.
 //! EMPTY is a legal argument and a legal result everywhere.
 
+mod abstraction;
 mod basic;
 mod condat;
 mod effect;
@@ -31,6 +34,7 @@ mod project;
 mod supcon;
 mod supreduce;
 
+pub use abstraction::{Abstraction, Uncontrolled, Unobserved, abstraction};
 pub use basic::{AlreadyKnown, allevents, reachable, selfloop, trim};
 pub use condat::{ControlData, UncontrollablyDisabled, condat};
 pub use effect::{OtherEffect, compare_effects};
@@ -38,7 +42,7 @@ pub use isomorph::{Difference, isomorph};
 pub use minstate::minstate;
 pub use nonconflict::{Conflict, nonconflict};
 pub use products::{meet, mutex, sync};
-pub use project::project;
+pub use project::{observer, project};
 pub(crate) use supcon::explicit_supcon;
 pub use supcon::{Explanation, Supcon, Violation, lift, supcon};
 pub use supreduce::{Reducing, Reduction, fewest_states, supreduce, supreduce_while};

@@ -91,6 +91,34 @@ fn ads() {
 }
 
 #[test]
+fn module() {
+    attack("module", &[], |bytes| {
+        let Some(model) = understudy_supervisor::read_module(&text(bytes)).model else {
+            return;
+        };
+        // What is right is the same after it was written.
+        let written = understudy_supervisor::write_module(&model);
+        let again = understudy_supervisor::read_module(&written);
+        let again = again.model.map(|again| understudy_supervisor::write_module(&again));
+        assert_eq!(again, Some(written));
+    });
+}
+
+#[test]
+fn generator() {
+    attack("generator", &[], |bytes| {
+        let Some(model) = understudy_supervisor::read_generator(&text(bytes)).model else {
+            return;
+        };
+        let written = understudy_supervisor::write_generator(&model.supervisors[0]);
+        let again = understudy_supervisor::read_generator(&written).model;
+        let again =
+            again.map(|again| understudy_supervisor::write_generator(&again.supervisors[0]));
+        assert_eq!(again, Some(written));
+    });
+}
+
+#[test]
 fn model() {
     let seeds = ["examples/small-factory/model.toml", "examples/boiler/pilot.toml"];
     attack("model", &seeds, |bytes| {

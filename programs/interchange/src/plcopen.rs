@@ -26,9 +26,9 @@ use understudy_text::{Diagnostic, Severity, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
 pub use typed::{drawn_units, read_typed};
+pub use understudy_text::xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 pub(crate) use write::confirm_order;
 pub use write::{TypedDocument, write, write_typed};
-pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 
 use crate::text::whole;
 use document::{ActionContent, Body, Condition, Instance, Kind, Pou, PouKind, Project};

@@ -4,7 +4,6 @@
 
 mod project;
 
-use roxmltree::Node;
 use understudy_structured_text::parser::{
     parse_body_at, parse_declarations_at, parse_statements_at,
 };
@@ -12,6 +11,7 @@ use understudy_structured_text::syntax::{
     Body, File, Name, ProgramInstance, Retention, Task, Unit, UnitKind,
 };
 use understudy_text::Diagnostic;
+use understudy_text::xml::Node;
 
 pub use self::project::{Joined, files_of_project, is_part};
 use crate::plcopen::xml::{attribute, child, children, elements, parse, start_tag, text, word};

@@ -1,4 +1,4 @@
-//! What every reader of a text file shares: diagnostics, spelling, TOML tables and durations.
+//! What every reader of a text file shares: diagnostics, spelling, TOML tables, XML with bounds, and durations.
 //!
 //! Readers of files return what they understood *and* a list of [`Diagnostic`]s, so that one run shows every error.
 //! A diagnostic has a stable code (`U0123`), a place in its source and, where one can be named, the fix. This crate
@@ -16,6 +16,7 @@ pub mod spelling;
 pub mod tables;
 mod visible;
 mod words;
+pub mod xml;
 
 use std::fmt;
 use std::ops::Range;

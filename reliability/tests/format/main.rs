@@ -1,5 +1,7 @@
 //! Chains as text: what is read, and how everything that is wrong is said at once.
 
+mod export;
+
 use std::fmt::Write;
 
 use proptest::prelude::*;

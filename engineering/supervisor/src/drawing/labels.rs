@@ -1,6 +1,7 @@
 //! Positions of labels on their arrows.
 
 use super::layout::Point;
+use super::picture::text_size;
 
 /// A rectangle by its centre and half of its width and height, in pixels.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +46,16 @@ const HEAD: f64 = 200.0;
 /// Half of what a head takes, in pixels.
 const HEAD_SIZE: f64 = 6.0;
 
+/// How far a label beside its arrow is from it, in pixels, and the share of the way in which the direction is taken.
+const BESIDE: f64 = 4.0;
+const STEP: f64 = 0.02;
+
+/// Half the width and half the height of lines of text.
+fn half_of(lines: &[String]) -> Point {
+    let (width, height) = text_size(lines);
+    (width / 2.0, height / 2.0)
+}
+
 /// Relative positions of labels along an arrow.
 const SHARES: [f64; 13] =
     [0.5, 0.46, 0.54, 0.42, 0.58, 0.37, 0.63, 0.32, 0.68, 0.26, 0.74, 0.18, 0.82];
@@ -83,10 +94,22 @@ impl Label {
         best.1
     }
 
-    /// Along quadratic curves, each by its start, its control point and its end.
+    /// On quadratic curves, each by its start, its control point and its end, or else beside them.
     pub(crate) fn along(arrow: usize, pieces: &[(Point, Point, Point)], lines: &[String]) -> Self {
-        let places = SHARES.into_iter().map(|share| on_curves(pieces, share)).collect();
-        Self { places, lines: lines.to_vec(), arrow: Some(arrow) }
+        let half = half_of(lines);
+        let on = SHARES.into_iter().map(|share| on_curves(pieces, share));
+        let sides = SHARES.into_iter().flat_map(|share| [(share, 1.0), (share, -1.0)]);
+        let beside = sides.map(|(share, side)| {
+            let (x, y) = on_curves(pieces, share);
+            let (before, behind) =
+                (on_curves(pieces, share - STEP), on_curves(pieces, share + STEP));
+            let (dx, dy) = (behind.0 - before.0, behind.1 - before.1);
+            let length = dx.hypot(dy).max(1e-6);
+            let (across, down) = (side * dy / length, side * -dx / length);
+            let distance = across.abs() * half.0 + down.abs() * half.1 + BESIDE;
+            (x + across * distance, y + down * distance)
+        });
+        Self { places: on.chain(beside).collect(), lines: lines.to_vec(), arrow: Some(arrow) }
     }
 }
 

@@ -28,6 +28,14 @@ pub(crate) struct Style {
     pub(crate) round: bool,
 }
 
+/// What a legend explains.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Sign {
+    Initial,
+    Marked,
+    Arrow(Style),
+}
+
 /// The edge of a node: what an arrow meets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Shape {
@@ -61,6 +69,7 @@ pub(crate) struct Picture {
     /// Points of arrows.
     spots: Vec<Spot>,
     arrows: usize,
+    legend: Vec<(Sign, &'static str)>,
     low: Point,
     high: Point,
 }
@@ -73,6 +82,7 @@ impl Default for Picture {
             taken: Vec::new(),
             spots: Vec::new(),
             arrows: 0,
+            legend: Vec::new(),
             low: (f64::INFINITY, f64::INFINITY),
             high: (f64::NEG_INFINITY, f64::NEG_INFINITY),
         }
@@ -161,8 +171,8 @@ impl Picture {
             self.spots.push(Spot { place, arrow, is_head: step == SAMPLES });
         }
         self.labels.push(Label::along(arrow, &pieces, label));
-        for bend in bends {
-            self.reach(*bend, (8.0, 8.0));
+        for place in bends.iter().chain([&start]) {
+            self.reach(*place, (8.0, 8.0));
         }
     }
 
@@ -185,9 +195,48 @@ impl Picture {
             point((x + 9.0, bottom))
         );
         self.line(&path, style);
-        let (_, height) = text_size(label);
-        let place = (x, bottom - rise - height / 2.0 + 4.0);
-        self.labels.push(Label::at(&[place], label));
+        let (width, height) = text_size(label);
+        let above = bottom - rise - height / 2.0 + 4.0;
+        let beside = width / 2.0 + 20.0;
+        let places = [(x, above), (x + beside, above + height), (x - beside, above + height)];
+        self.labels.push(Label::at(&places, label));
+    }
+
+    /// Says below the picture what its signs mean.
+    pub(crate) fn legend(&mut self, entries: impl IntoIterator<Item = (Sign, &'static str)>) {
+        self.legend.extend(entries);
+    }
+
+    fn draw_legend(&mut self) {
+        let (left, mut y) = (self.low.0 + 12.0, self.high.1 + LINE);
+        for (sign, text) in std::mem::take(&mut self.legend) {
+            let (middle, right) = (left + 18.0, left + 36.0);
+            let ring = |radius: f64, fill: &str| {
+                format!(
+                    "<circle cx=\"{middle:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"black\"/>\n"
+                )
+            };
+            match sign {
+                Sign::Initial => {
+                    let path = format!("M {} L {}", point((left, y)), point((middle - 6.0, y)));
+                    self.line(&path, Style::default());
+                    self.shapes.push_str(&ring(6.0, "lightblue"));
+                }
+                Sign::Marked => self.shapes.push_str(&(ring(6.0, "white") + &ring(3.5, "white"))),
+                Sign::Arrow(style) => {
+                    let path = format!("M {} L {}", point((left, y)), point((right, y)));
+                    self.line(&path, style);
+                }
+            }
+            let (width, _) = text_size(&[text.to_owned()]);
+            let (x, base) = (right + 10.0, y + 4.0);
+            let _ = writeln!(
+                self.shapes,
+                "<text x=\"{x:.1}\" y=\"{base:.1}\" style=\"text-anchor: start\">{text}</text>"
+            );
+            self.reach((x + width, y), (6.0, LINE / 2.0 + 4.0));
+            y += LINE + 4.0;
+        }
     }
 
     fn line(&mut self, path: &str, style: Style) {
@@ -223,6 +272,7 @@ impl Picture {
 
     pub(crate) fn finish(mut self) -> String {
         self.place_labels();
+        self.draw_legend();
         if self.low.0 > self.high.0 {
             self.reach((0.0, 0.0), (40.0, 40.0));
         }

@@ -9,7 +9,7 @@ use understudy_text::spelling;
 
 use super::read::Loader;
 use crate::alphabet::{Alphabet, Event, Label};
-use crate::automaton::{Automaton, State, Transition};
+use crate::automaton::{Automaton, Named, State, Transition};
 use crate::events::Events;
 use crate::form::{Form, Place, Word, trimmed};
 use crate::format;
@@ -77,38 +77,27 @@ pub(super) fn read_component(
         states.names.push(("0", place.clone()));
     }
     let initial = initial.and_then(|(word, _)| states.numbers.get(word).copied()).unwrap_or(0);
-    build(form, name, own, states, marked, transitions, initial)
+    let names = states.names;
+    let parts = Named {
+        name,
+        events: own,
+        states: names.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        initial: initial as usize,
+        marked,
+        transitions,
+    };
+    build(form, names, parts)
 }
 
-fn build(
-    form: &mut Form<'_>,
-    name: String,
-    own: Vec<Event>,
-    states: States<'_>,
-    mut marked: Vec<bool>,
-    mut transitions: Vec<Transition>,
-    initial: u32,
-) -> Option<Automaton> {
-    // State 0 is the initial one.
-    let swap = |state: State| match state.number() {
-        0 => State::new(initial),
-        number if number == initial => State::INITIAL,
-        _ => state,
-    };
-    for transition in &mut transitions {
-        transition.source = swap(transition.source);
-        transition.target = swap(transition.target);
-    }
-    let mut names = states.names;
-    names.swap(0, initial as usize);
-    marked.swap(0, initial as usize);
-    let texts: Vec<String> = names.iter().map(|(name, _)| (*name).to_owned()).collect();
-    match Automaton::new(name, own, marked, transitions) {
+/// An automaton of states in the order of a file, of which `initial` is the first one.
+fn build(form: &mut Form<'_>, names: Vec<Word<'_>>, parts: Named) -> Option<Automaton> {
+    let mut names = names;
+    names.swap(0, parts.initial);
+    // Numbers are the names of states that have none.
+    match parts.automaton(|number| number.to_string()) {
         Ok(automaton) => {
             warn_of_unreached(form, &automaton, &names);
-            // Numbers are the names of states that have none.
-            let has_names = (0_u32..).zip(&texts).any(|(number, text)| *text != number.to_string());
-            Some(if has_names { automaton.named_states(texts) } else { automaton })
+            Some(automaton)
         }
         Err(error) => {
             let place = names[0].1.clone();

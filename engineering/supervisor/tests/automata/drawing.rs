@@ -39,6 +39,9 @@ fn a_picture_has_all_states_and_events_and_a_bound() {
     let marked = reduced.marked().count();
     assert_eq!(picture.matches("<ellipse").count(), reduced.state_count() + marked);
     assert!(picture.contains(">1, 3<") && picture.contains("stroke-dasharray"), "{picture}");
+    for sign in ["initial state", "marked state", "controllable event", "uncontrollable event"] {
+        assert!(picture.contains(&format!(">{sign}<")), "{sign}");
+    }
     draw_automaton_svg(&Automaton::empty("E", Alphabet::new([]))).expect("nothing to draw");
     let (plants, buffers) = line(5, 2);
     let parts: Vec<&Automaton> = plants.iter().chain(&buffers).collect();
@@ -59,7 +62,8 @@ fn texts(picture: &str) -> Vec<(&str, [f64; 2], [f64; 2])> {
         let (_, text) = line.split_once('>').expect("a text");
         let text = text.trim_end_matches("</text>");
         let half = [text.chars().count() as f64 * 3.0, 5.0];
-        (text, [number(line, "x"), number(line, "y") - 4.0], half)
+        let start = if line.contains("text-anchor: start") { half[0] } else { 0.0 };
+        (text, [number(line, "x") + start, number(line, "y") - 4.0], half)
     });
     texts.collect()
 }
@@ -76,20 +80,32 @@ fn heads(picture: &str) -> Vec<[f64; 2]> {
     heads.collect()
 }
 
-/// In the pictures of the papers, texts cover neither each other nor the heads of arrows.
+/// Components of the reference models: those that a paper would print.
+fn components() -> Vec<Automaton> {
+    let all = crate::models::MODELS.into_iter().flat_map(|name| {
+        let model = Model::read(name);
+        let small = model.file("_SIMSUP");
+        let small = (small.state_count() < 12).then_some(small);
+        model.plants.into_iter().chain(model.specifications).chain(small)
+    });
+    all.collect()
+}
+
+/// In the pictures of the papers and of the reference models, texts cover neither each other nor the heads of arrows.
 #[test]
-fn the_texts_of_the_papers_pictures_are_legible() {
+fn the_texts_of_pictures_are_legible() {
     let automaton = read_ads(include_str!("../../../../examples/avalanche/TEST.ADS")).automaton;
     let motivating = include_str!("../../../../examples/motivating-example/supervisor.ADS");
     let motivating = read_ads(motivating).automaton;
     let net = read_net(include_str!("../../../../examples/assembly-cell/net.toml")).file;
-    let pictures = [
-        draw_automaton_svg(&automaton.expect("an automaton")),
-        draw_automaton_svg(&motivating.expect("an automaton")),
-        draw_net_svg(&net.expect("a net").net),
-    ];
-    for picture in pictures.map(|picture| picture.expect("it fits")) {
-        let texts = texts(&picture);
+    let automata = [automaton.expect("an automaton"), motivating.expect("an automaton")];
+    let automata = automata.into_iter().chain(components());
+    let pictures: Vec<String> = automata
+        .map(|automaton| draw_automaton_svg(&automaton).expect("it fits"))
+        .chain([draw_net_svg(&net.expect("a net").net).expect("it fits")])
+        .collect();
+    for picture in &pictures {
+        let texts = texts(picture);
         for (number, (text, middle, half)) in texts.iter().enumerate() {
             let is_near = |other: &[f64; 2], size: &[f64; 2]| {
                 (0..2).all(|axis| (middle[axis] - other[axis]).abs() < half[axis] + size[axis])
@@ -97,7 +113,7 @@ fn the_texts_of_the_papers_pictures_are_legible() {
             for (other, place, size) in &texts[number + 1..] {
                 assert!(!is_near(place, size), "{text} covers {other}\n{picture}");
             }
-            for head in heads(&picture) {
+            for head in heads(picture) {
                 assert!(!is_near(&head, &[0.0; 2]), "{text} covers a head\n{picture}");
             }
         }

@@ -5,10 +5,10 @@ mod edge;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use roxmltree::Node;
 use understudy_ladder::{
     Element, Feed, MAXIMUM_RUNGS, Name, Program, Rung, Series, Signal, check, visit,
 };
+use understudy_text::xml::Node;
 use understudy_text::{Diagnostic, has_errors};
 
 use super::Reading;

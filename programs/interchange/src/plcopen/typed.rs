@@ -13,11 +13,11 @@ pub(crate) mod values;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-use roxmltree::Node;
 use understudy_ladder::Name as Written;
 use understudy_structured_text::parser::{parse_instructions_at, parse_statements_at};
 use understudy_structured_text::syntax::{Body, File, Unit, UnitKind};
 use understudy_text::Diagnostic;
+use understudy_text::xml::Node;
 
 use crate::diagrams::Style;
 

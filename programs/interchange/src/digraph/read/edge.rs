@@ -1,11 +1,11 @@
 //! Edges: their ends, and the elements that they are.
 
-use roxmltree::Node;
 use understudy_ladder::{
     Block, BlockKind, Coil, Comparison, Contact, Element, MAXIMUM_PRESET_VALUE, Name, Relation,
 };
 use understudy_text::Diagnostic;
 use understudy_text::duration;
+use understudy_text::xml::Node;
 
 use super::super::graph::{coil_kind, contact_kind, edge_types};
 use super::super::infer::Use;

@@ -3,9 +3,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use roxmltree::Node;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
+use understudy_text::xml::Node;
 
 use super::read::Reader;
 use super::{Body, Graph, Kind, Language, Object};

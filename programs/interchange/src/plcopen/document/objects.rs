@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::str::FromStr;
 
-use roxmltree::Node;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
+use understudy_text::xml::Node;
 
 use super::macro_step::Ends;
 use super::read::Reader;

@@ -1,8 +1,8 @@
 //! From elements to a [`Project`]: projects, units, variables, types.
 
-use roxmltree::Node;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
+use understudy_text::xml::Node;
 
 use super::objects::graph;
 use super::{

@@ -1,8 +1,8 @@
 //! `<rung>`, which is not of the schema: one tool writes ladders as rungs of contacts and coils in the order of the current,
 //! and blocks whose pins name variables. Each becomes the objects that it means.
 
-use roxmltree::Node;
 use understudy_ladder::{BlockKind, Name};
+use understudy_text::xml::Node;
 
 use super::objects::{modifier, read_modifier};
 use super::read::Reader;

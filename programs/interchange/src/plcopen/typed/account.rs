@@ -1,6 +1,6 @@
 //! The account of a document: each element and attribute is one that is understood, or changes nothing, or is refused by its name.
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use crate::plcopen::xml::{held, start_tag};

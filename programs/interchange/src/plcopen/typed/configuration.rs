@@ -1,8 +1,8 @@
 //! What runs: configurations, resources, tasks, instances of programs, global variables.
 
-use roxmltree::Node;
 use understudy_structured_text::parser::{Places, parse_expression_at};
 use understudy_structured_text::syntax::{Class, ProgramInstance, Retention, Task};
+use understudy_text::xml::Node;
 
 use super::Typed;
 use super::make::name;

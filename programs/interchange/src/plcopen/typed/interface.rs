@@ -1,11 +1,11 @@
 //! Variables, types and initial values of a document.
 
-use roxmltree::Node;
 use understudy_structured_text::parser::{Places, parse_expression_at, parse_initializer_at};
 use understudy_structured_text::syntax::{
     Class, Declaration, Expression, Initializer, Name, Retention, TypeDefinition, TypeKind,
     TypeName,
 };
+use understudy_text::xml::Node;
 
 use super::make;
 use super::{Typed, make::name};

@@ -6,11 +6,11 @@
 
 use std::collections::HashMap;
 
-use roxmltree::Node;
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{
     Argument, Body, Expression, ExpressionKind, File, Path, Statement, StatementKind,
 };
+use understudy_text::xml::Node;
 
 use crate::plcopen::typed::make;
 use crate::plcopen::xml::{child, children, elements, parse, word};

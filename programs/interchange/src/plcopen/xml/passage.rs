@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use roxmltree::Node;
+use understudy_text::xml::Node;
 
 const CDATA: (&str, &str) = ("<![CDATA[", "]]>");
 
