@@ -4,6 +4,7 @@
 //! reported and the default goes on in its place, so that the rest is still checked.
 
 mod command;
+mod digits;
 
 use std::collections::BTreeMap;
 use std::net::{SocketAddr, SocketAddrV4};
@@ -294,20 +295,6 @@ impl<'a, 't> Fields<'a, 't> {
         let bounds = u64::from(least)..=u64::from(most);
         let count = value.and_then(|value| value.count(bounds, diagnostics));
         count.map_or(default, |count| count.value as u32)
-    }
-
-    /// A whole number in its bounds; nothing where absent or wrong.
-    pub(crate) fn digits(
-        &self,
-        name: &'static str,
-        diagnostics: &mut Vec<Diagnostic>,
-    ) -> Option<Placed<u8>> {
-        let (key, value) = self.get(name);
-        let Kind::Digits { most } = key.kind else {
-            unreachable!("`{name}` is a number of digits in its table");
-        };
-        let count = value?.count(0..=u64::from(most), diagnostics)?;
-        Some(count.map(|count| count as u8))
     }
 
     /// A time in its bounds; its default where absent or wrong.

@@ -6,6 +6,7 @@
     reason = "what is waited for has a deadline on the real clock"
 )]
 
+mod cards;
 mod level;
 
 use std::fs::{self, Permissions};
