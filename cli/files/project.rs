@@ -30,7 +30,7 @@ impl ProgramText {
     pub(crate) fn of(path: &Path) -> Result<Self, Answer> {
         let name = path.display().to_string();
         match project(path)? {
-            Some(Files::Named(project)) => Self::named_by(name, path, project),
+            Some(Files::Named(project)) => Self::named_by(name, project),
             Some(Files::Found(files)) => Self::together(name, &files),
             None => Ok(Self { text: text(path)?, name, joined: None }),
         }
@@ -79,8 +79,8 @@ impl ProgramText {
     }
 
     /// The files that a project names; what is missing is reported with what is found in the others.
-    fn named_by(name: String, path: &Path, mut project: ProjectFile) -> Result<Self, Answer> {
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    fn named_by(name: String, mut project: ProjectFile) -> Result<Self, Answer> {
+        let folder = Path::new(&project.name).parent().unwrap_or(Path::new("")).to_owned();
         let mut texts = Vec::new();
         let mut missing = Vec::new();
         for (file, place) in std::mem::take(&mut project.files) {

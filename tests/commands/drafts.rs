@@ -10,7 +10,10 @@ fn programs(folder: &Path, found: &mut Vec<PathBuf>) {
     let entries = fs::read_dir(folder).expect("a folder");
     for path in entries.map(|entry| entry.expect("an entry").path()) {
         if path.is_dir() {
-            programs(&path, found);
+            // Files of a project are no programs alone.
+            if !path.ends_with("other-tools/conveyor") {
+                programs(&path, found);
+            }
         } else if path.extension().is_some_and(|ending| {
             ["st", "xml", "ladder", "ld"].iter().any(|known| ending == *known)
         }) {
@@ -31,9 +34,7 @@ fn draft(folder: &Path, file: &str) -> (bool, bool) {
         let answer = understudy_in(folder, &files);
         assert_eq!(answer.status, 0, "{file}: {}", answer.shown());
     }
-    // A library is right, and is no program.
-    let is_program = checked.status == 0 && !checked.output.contains("a library without a program");
-    (is_program, drafted.status == 0)
+    (checked.status == 0, drafted.status == 0)
 }
 
 fn simulate(folder: &Path, file: &str) {

@@ -70,7 +70,7 @@ fn what_is_wrong_is_said_in_its_file() {
     change("main.st", "belt.motor", "belt.motr");
     change("belt.xml", "PT := run_up", "PT := run_upp");
     for arguments in [&["check", "."][..], &["check", "main.st", "types.st", "belt.xml"]] {
-        wrong(&folder, arguments, &["main.st:18:", "motr", "belt.xml:32:", "`run_upp`"]);
+        wrong(&folder, arguments, &["main.st:19:", "motr", "belt.xml:30:", "`run_upp`"]);
     }
     // A name of two files.
     change(
@@ -112,9 +112,9 @@ fn memory_becomes_an_output() {
     let text = "VAR_GLOBAL total : INT; END_VAR
 PROGRAM count VAR_INPUT go : BOOL; END_VAR VAR n : INT; t : TON; END_VAR n := SEL(go, 0, n + 1); total := total + 1; END_PROGRAM";
     fs::write(folder.join("count.st"), text).expect("written");
-    wrong(&folder, &["init", "cell", "--from", "count.st"], &["U0622", "--output", "`n`"]);
+    wrong(&folder, &["init", "cell", "--from", "count.st"], &["U0622", "--output", "`total`"]);
     wrong(&folder, &["init", "cell", "--from", "count.st", "--output", "m"], &["U0639", "m"]);
-    wrong(&folder, &["init", "cell", "--from", "count.st", "--output", "t"], &["U10"]);
+    wrong(&folder, &["init", "cell", "--from", "count.st", "--output", "t"], &["U0639", "`t`"]);
     assert!(!folder.join("cell").exists());
     fs::write(folder.join("inputs.txt"), "1\n1\n0\n").expect("written");
     for (name, output, expected) in [

@@ -11,7 +11,7 @@ use understudy_cluster::{
     Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
 };
 use understudy_interchange::{
-    Apart, Copies, Format, IDLE_PROGRAM, OutputError, Source, USUAL_PERIOD, read_apart,
+    Apart, Copies, Format, IDLE_PROGRAM, NO_OUTPUT, OutputError, Source, USUAL_PERIOD, read_apart,
     read_with_outputs,
 };
 use understudy_text::spelling::suggestion;
@@ -338,12 +338,19 @@ impl Found {
         if self.reports.iter().any(Report::has_errors) {
             return;
         }
-        for output in wanted.iter().filter(|output| !self.outputs.contains(*output)) {
-            let known = suggestion(output, self.memory.iter().map(String::as_str));
-            let message = format!(
-                "--output {output}: no program has a variable of this name in its memory or among its global variables; {known}"
-            );
-            self.failures.push(Failure { code: "U0639".to_owned(), message });
+        let lacking = wanted.iter().filter(|output| !self.outputs.contains(*output));
+        for output in lacking.collect::<Vec<_>>() {
+            let (_, name) = output.rsplit_once('.').unwrap_or(("", output));
+            let message = match self.memory.iter().any(|known| known.eq_ignore_ascii_case(name)) {
+                true => format!(
+                    "--output {output}: only a variable of a PROGRAM or a global one becomes an output, and none at an address (AT %M…); declare it at an address in %Q"
+                ),
+                false => format!(
+                    "--output {output}: no program has a variable of this name in its memory or among its global variables; {}",
+                    suggestion(output, self.memory.iter().map(String::as_str))
+                ),
+            };
+            self.fail(NO_OUTPUT, message);
         }
     }
 

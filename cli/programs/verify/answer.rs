@@ -347,10 +347,10 @@ impl Finding {
         Self::told(circuit, property, formula, verdict, message, scans)
     }
 
-    /// All inputs of the run in which it fails.
-    pub(super) fn counterexample(&self) -> Option<&[Driven]> {
+    /// All inputs of the run in which it fails, and the scan to which it returns.
+    pub(super) fn counterexample(&self) -> Option<(&[Driven], Option<usize>)> {
         let scans = self.scans.as_ref().filter(|_| self.verdict == "fails")?;
-        Some(scans.inputs.as_slice())
+        Some((scans.inputs.as_slice(), scans.again_from))
     }
 
     /// Says of a property that fails that it is about inputs alone, where it is.

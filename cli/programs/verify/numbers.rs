@@ -113,8 +113,8 @@ pub(super) fn of_cluster(
     proved.starts_together = members.len() > 1;
     let mut runs = properties.iter().zip(&proved.properties);
     let scenario = runs.find_map(|(property, finding)| {
-        let run = finding.counterexample()?;
-        Some(scenario::of_run(cluster, property, run))
+        let (run, again_from) = finding.counterexample()?;
+        Some(scenario::of_run(cluster, property, run, again_from))
     });
     Ok((proved, scenario))
 }

@@ -17,6 +17,12 @@ use understudy_wire::{Member, PointValue, ProgramId, StateChoice, StationId};
 /// Numbers of scans for which the inputs before a run are tried.
 const TRIED: [usize; 12] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 100, 1001];
 
+/// How often the part of a run without end is repeated.
+const ROUNDS: usize = 3;
+
+/// The most scans of a run.
+const LONGEST: usize = 2_000;
+
 /// Values of all inputs of a program in a scan, in their order.
 type Inputs = Vec<u64>;
 
@@ -32,7 +38,7 @@ struct Driver<'a> {
     scans: Vec<Inputs>,
 }
 
-/// The scenario in which a property fails as in the run with these inputs.
+/// The scenario in which a property fails as in the run with these inputs; a run without end returns to the scan `again_from`.
 ///
 /// # Errors
 /// The reason why no scenario drives the cluster so.
@@ -40,16 +46,15 @@ pub(super) fn of_run(
     cluster: &Cluster,
     property: &Property,
     run: &[Driven],
+    again_from: Option<usize>,
 ) -> Result<Scenario, String> {
     let named = property.formula.signals().into_iter();
     let named = named.filter_map(|named| named.name.split_once('.').map(|(name, _)| name));
     let named: BTreeSet<&str> = named.collect();
     let controllers = (0..).map(ProgramId).zip(cluster.controllers());
     let programs = controllers.filter(|(_, controller)| named.contains(controller.name.as_str()));
-    let programs: Vec<ProgramId> = programs.map(|(program, _)| program).collect();
-    let is_one = programs.len() == 1;
-    let drivers: Result<Vec<Driver<'_>>, String> =
-        programs.iter().map(|program| Driver::new(cluster, *program, run, is_one)).collect();
+    let drivers = programs.map(|(program, _)| Driver::new(cluster, program, run, again_from));
+    let drivers: Result<Vec<Driver<'_>>, String> = drivers.collect();
     Ok(scenario(cluster, property, &drivers?))
 }
 
@@ -58,7 +63,7 @@ impl<'a> Driver<'a> {
         cluster: &'a Cluster,
         program: ProgramId,
         run: &[Driven],
-        is_one: bool,
+        again_from: Option<usize>,
     ) -> Result<Self, String> {
         let controller = &cluster.controllers()[program.index()];
         let remote_io = &cluster.remote_ios()[program.index()];
@@ -80,27 +85,31 @@ impl<'a> Driver<'a> {
                 run.iter().find(|driven| driven.name.strip_prefix(name.as_str()) == Some(of));
             driven.map(|driven| driven.values.as_slice())
         };
-        let is_ever = |of: &str| values(of).is_some_and(|values| values.iter().any(|it| *it != 0));
-        if is_ever(".power.returns") || is_ever(&format!(".{}", Program::RESET)) {
-            return Err(format!("`{name}` is restarted in the run"));
+        let is_ever = |of: &str, value| values(of).is_some_and(|values| values.contains(&value));
+        if is_ever(".power.returns", 1) {
+            return Err(format!("`{name}` starts warm in the run"));
         }
-        let count = run.first().map_or(0, |driven| driven.values.len());
-        let is_sampled = |scan: &usize| values(".sampled").is_none_or(|values| values[*scan] != 0);
-        let sampled: Vec<usize> = (0..count).filter(is_sampled).collect();
-        if sampled.len() < count && !is_one {
+        if is_ever(".sampled", 0) {
             return Err(format!("`{name}` misses a sample in the run"));
         }
+        let count = run.first().map_or(0, |driven| driven.values.len());
         let points: Vec<_> = typed.inputs.iter().filter(|point| point.slot != 0).collect();
         let names: Vec<&str> = points.iter().map(|point| point.name.as_str()).collect();
-        let of_scan = |scan: &usize| {
+        let of_scan = |scan: usize| {
             let driven = points.iter().map(|point| {
                 let values = values(&format!(".{}", point.name));
-                values.map_or(point.initial, |values| values[*scan])
+                values.map_or(point.initial, |values| values[scan])
             });
             driven.collect::<Inputs>()
         };
-        let scans: Vec<Inputs> = sampled.iter().map(of_scan).collect();
+        let rounds =
+            again_from.into_iter().flat_map(|from| (0..ROUNDS).flat_map(move |_| from..count));
+        let scans: Vec<Inputs> = (0..count).chain(rounds).take(LONGEST).map(of_scan).collect();
         let initial: Inputs = points.iter().map(|point| point.initial).collect();
+        let is_stopped = states(typed, &initial, 0, &scans).iter().any(|(fault, ..)| *fault != 0);
+        if is_stopped && is_ever(&format!(".{}", Program::RESET), 1) {
+            return Err(format!("`{name}` is restarted in the run, after a program fault"));
+        }
         let mut tried = std::iter::once(&initial).chain(&scans);
         let before = tried.find(|before| remains(typed, before, &scans)).cloned();
         let before = before.ok_or_else(|| {
@@ -110,29 +119,36 @@ impl<'a> Driver<'a> {
     }
 }
 
+/// The fault, the memory and the outputs of a program in the scans with some inputs, behind a number of scans with those `before`.
+fn states(
+    program: &Program,
+    before: &Inputs,
+    first: usize,
+    scans: &[Inputs],
+) -> Vec<(u64, Vec<u64>, Vec<u64>)> {
+    let machine = Machine::new(program);
+    let mut state = machine.initial().to_vec();
+    let mut scratch = Scratch::default();
+    let mut outputs = vec![0; machine.output_count().div_ceil(64)];
+    let mut run = |inputs: &Inputs| {
+        let mut image = vec![0; machine.input_count().div_ceil(64)];
+        let points = program.inputs.iter().filter(|point| point.slot != 0);
+        points.zip(inputs).for_each(|(point, value)| point.set(&mut image, *value));
+        machine.step(&mut scratch, &mut state, &image, &mut outputs);
+        // The rest of the header counts the scans.
+        let kept = state.iter().skip(Program::HEADER as usize);
+        (state[0], kept.copied().collect(), outputs.clone())
+    };
+    for _ in 0..first {
+        run(before);
+    }
+    scans.iter().map(run).collect()
+}
+
 /// Whether a program is in the same states in the scans with these inputs after any number of scans with those `before`.
 fn remains(program: &Program, before: &Inputs, scans: &[Inputs]) -> bool {
-    let machine = Machine::new(program);
-    let states = |first: usize| {
-        let mut state = machine.initial().to_vec();
-        let mut scratch = Scratch::default();
-        let mut outputs = vec![0; machine.output_count().div_ceil(64)];
-        let mut run = |inputs: &Inputs| {
-            let mut image = vec![0; machine.input_count().div_ceil(64)];
-            let points = program.inputs.iter().filter(|point| point.slot != 0);
-            points.zip(inputs).for_each(|(point, value)| point.set(&mut image, *value));
-            machine.step(&mut scratch, &mut state, &image, &mut outputs);
-            // The header counts the scans.
-            let kept = state.iter().skip(Program::HEADER as usize);
-            (state[0], kept.copied().collect::<Vec<u64>>(), outputs.clone())
-        };
-        (0..first).for_each(|_| {
-            run(before);
-        });
-        scans.iter().map(run).collect::<Vec<_>>()
-    };
-    let alone = states(0);
-    TRIED.iter().all(|first| states(*first) == alone)
+    let alone = states(program, before, 0, scans);
+    TRIED.iter().all(|first| states(program, before, *first, scans) == alone)
 }
 
 /// The steps: the inputs before the run are set, the stations with a state of the programs are started again, the programs start cold, and then the

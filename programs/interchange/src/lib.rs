@@ -21,7 +21,7 @@ pub use apart::{Apart, Copies, IDLE_PROGRAM, NOT_EXECUTED, read_apart};
 pub use diagrams::{DrawnBody, DrawnUnit, draw_typed, drawn_units, listing};
 pub use format::{Format, Reading, read, read_ladder, unknown_form};
 pub use listing::Listing;
-pub use outputs::{OutputError, WithOutputs, read_with_outputs};
+pub use outputs::{NO_OUTPUT, OutputError, WithOutputs, read_with_outputs};
 pub use project::{Joined, ProjectFile, can_be_joined, groups, is_part, read_project};
 pub use source::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
 pub use typed_text::{Bodies, typed_text};

@@ -6,9 +6,12 @@ use understudy_text::Severity;
 
 use crate::apart::{Apart, Copies, read_apart};
 use crate::format::Format;
-use crate::source::Wanted;
+use crate::source::{Source, Wanted};
 use crate::typed_text::{Bodies, typed_text_with};
 use crate::written::WriteError;
+
+/// Code of the error on a variable that becomes no output.
+pub const NO_OUTPUT: &str = "U0639";
 
 /// The address of an output that is nowhere in particular.
 const ANYWHERE: &str = "%Q*";
@@ -58,8 +61,27 @@ pub fn read_with_outputs(
             let reason = format!("with {} as outputs: {}", outputs.join(", "), error.message);
             Err(OutputError::Refused(error.code, reason))
         }
-        None => Ok(Some(WithOutputs { programs, outputs })),
+        None => match outputs.iter().find(|output| !is_output(&programs, output)) {
+            Some(output) => {
+                let reason = format!("`{output}` is of a type that has no outputs");
+                Err(OutputError::Refused(NO_OUTPUT, reason))
+            }
+            None => Ok(Some(WithOutputs { programs, outputs })),
+        },
     }
+}
+
+/// Whether a variable, or a part of it, is an output of a program.
+fn is_output(programs: &[Apart], wanted: &str) -> bool {
+    let (_, name) = wanted.rsplit_once('.').unwrap_or(("", wanted));
+    let mut points = programs.iter().flat_map(|apart| match &apart.source {
+        Source::Program(typed) => typed.outputs.iter(),
+        Source::Library(_) => [].iter(),
+    });
+    points.any(|point| {
+        let whole = point.name.split(['.', '[']).next().unwrap_or_default();
+        whole.eq_ignore_ascii_case(name)
+    })
 }
 
 /// Makes the variable of a program, or a global one, an output; false where there is none of that name.

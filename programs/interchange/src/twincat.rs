@@ -20,6 +20,9 @@ pub(crate) const ROOT: &str = "TcPlcObject";
 /// A Structured Text in the document of a project.
 pub(crate) const TEXT: &str = "StructuredText";
 
+/// Behind the name of a library, its program for the pictures of a visualisation.
+const VISUALISATION: &str = ".Visu_Prg";
+
 /// Elements that change nothing: folders, and where lines are.
 const READ_PAST: [&str; 4] = ["Folder", "LineIds", "ObjectProperties", "Data"];
 
@@ -146,6 +149,11 @@ impl Reader {
         });
         for called in children(object, "PouCall").filter_map(|call| child(call, "Name")) {
             let of = word(called);
+            if of.ends_with(VISUALISATION) {
+                let message = format!("`{}` draws pictures, and is not executed", of.as_str());
+                self.diagnostics.push(Diagnostic::warning("U1055", message, of.span()));
+                continue;
+            }
             let of = Name::new(of.as_str(), of.span());
             let task = Some(name.clone());
             let retention = Retention::Unstated;
