@@ -417,9 +417,9 @@ fn a_counterexample_is_a_scenario() {
     let asked = ["verify", cell, "--property", property, "--scenario", "fails.toml"];
     let failed = understudy_in(&folder, &asked);
     assert_eq!(failed.status, 1, "{}", failed.shown());
-    let simulate = ["simulate", cell, "--scenario", "fails.toml", "--seed", "1"];
+    let simulate = ["simulate", cell, "--scenario", "fails.toml", "--seed", "1", "--out", "runs"];
     assert_eq!(understudy_in(&folder, &simulate).status, 0);
-    let journal = ["journal", "runs/latest", "--all", "--event", "applied", "--from", "500"];
+    let journal = ["journal", "runs/latest", "--event", "applied", "--from", "599", "--to", "602"];
     let applied = understudy_in(&folder, &journal).output;
     let drives = |cycle: u64| {
         let mut lines = applied.lines().map(str::trim_start);

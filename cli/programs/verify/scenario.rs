@@ -1,21 +1,20 @@
 //! A counterexample as a scenario of a cluster: the program starts cold, and its inputs are set scan by scan.
 //!
-//! When the cluster is complete, its program has made scans already, and it makes some more between a cold start and the first set input. Therefore
-//! a run has a scenario only where its program remains in its initial state with some inputs, which are set until the run begins; this is tried
-//! with the program itself. Behind that the same inputs lead to the same states.
+//! A program makes some scans between its cold start and the first set input, and how many is not known. Therefore a run has a scenario only where
+//! some inputs in front of it change nothing that the property speaks of; this is tried with the program itself.
 
 use std::collections::BTreeSet;
 
 use understudy_cluster::{Cluster, InputSourceKind};
 use understudy_journal::Members;
 use understudy_scenarios::{Action, Fault, Scenario};
-use understudy_typed::{Machine, Program, Scratch};
+use understudy_typed::{Machine, Part, Program, Scratch};
 use understudy_verification::numbers::Driven;
 use understudy_verification::property::Property;
 use understudy_wire::{Member, PointValue, ProgramId, StateChoice, StationId};
 
 /// Numbers of scans for which the inputs before a run are tried.
-const TRIED: [usize; 12] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 100, 1001];
+const TRIED: [usize; 14] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 50, 100, 400, 1001];
 
 /// How often the part of a run without end is repeated.
 const ROUNDS: usize = 3;
@@ -53,7 +52,8 @@ pub(super) fn of_run(
     let named: BTreeSet<&str> = named.collect();
     let controllers = (0..).map(ProgramId).zip(cluster.controllers());
     let programs = controllers.filter(|(_, controller)| named.contains(controller.name.as_str()));
-    let drivers = programs.map(|(program, _)| Driver::new(cluster, program, run, again_from));
+    let drivers =
+        programs.map(|(program, _)| Driver::new(cluster, program, property, (run, again_from)));
     let drivers: Result<Vec<Driver<'_>>, String> = drivers.collect();
     Ok(scenario(cluster, property, &drivers?))
 }
@@ -62,8 +62,8 @@ impl<'a> Driver<'a> {
     fn new(
         cluster: &'a Cluster,
         program: ProgramId,
-        run: &[Driven],
-        again_from: Option<usize>,
+        property: &Property,
+        (run, again_from): (&[Driven], Option<usize>),
     ) -> Result<Self, String> {
         let controller = &cluster.controllers()[program.index()];
         let remote_io = &cluster.remote_ios()[program.index()];
@@ -106,26 +106,48 @@ impl<'a> Driver<'a> {
             again_from.into_iter().flat_map(|from| (0..ROUNDS).flat_map(move |_| from..count));
         let scans: Vec<Inputs> = (0..count).chain(rounds).take(LONGEST).map(of_scan).collect();
         let initial: Inputs = points.iter().map(|point| point.initial).collect();
-        let is_stopped = states(typed, &initial, 0, &scans).iter().any(|(fault, ..)| *fault != 0);
+        let is_stopped = shown(typed, &[], &initial, 0, &scans).iter().any(|shown| shown[0] != 0);
         if is_stopped && is_ever(&format!(".{}", Program::RESET), 1) {
             return Err(format!("`{name}` is restarted in the run, after a program fault"));
         }
+        let watched = watched(typed, name, property)?;
         let mut tried = std::iter::once(&initial).chain(&scans);
-        let before = tried.find(|before| remains(typed, before, &scans)).cloned();
+        let before = tried.find(|before| changes_nothing(typed, &watched, before, &scans)).cloned();
         let before = before.ok_or_else(|| {
-            format!("`{name}` does not remain in its initial state with any inputs of the run")
+            format!(
+                "no inputs were found with which `{name}` could wait for the run after its start"
+            )
         })?;
         Ok(Self { program, typed, names, before, scans })
     }
 }
 
-/// The fault, the memory and the outputs of a program in the scans with some inputs, behind a number of scans with those `before`.
-fn states(
+/// The variables of a program that a property speaks of; its fault is watched in any case.
+fn watched(program: &Program, name: &str, property: &Property) -> Result<Vec<Part>, String> {
+    let own = |of: &str| Some(of.strip_prefix(name)?.strip_prefix('.')?.to_owned());
+    let part = |of: &str| program.part(of).filter(|part| part.of.elementary().is_some());
+    let mut watched = Vec::new();
+    for named in property.formula.signals() {
+        let Some(signal) = own(&named.name) else {
+            continue;
+        };
+        if signal != Program::FAULT {
+            watched.push(part(&signal).ok_or_else(|| format!("`{}` is no variable", named.name))?);
+        }
+        let other = named.compared.as_ref().and_then(|compared| own(&compared.with));
+        watched.extend(other.and_then(|other| part(&other)));
+    }
+    Ok(watched)
+}
+
+/// The fault of a program and what is `watched` in the scans with some inputs, behind a number of scans with those `before`.
+fn shown(
     program: &Program,
+    watched: &[Part],
     before: &Inputs,
     first: usize,
     scans: &[Inputs],
-) -> Vec<(u64, Vec<u64>, Vec<u64>)> {
+) -> Vec<Vec<u64>> {
     let machine = Machine::new(program);
     let mut state = machine.initial().to_vec();
     let mut scratch = Scratch::default();
@@ -135,9 +157,8 @@ fn states(
         let points = program.inputs.iter().filter(|point| point.slot != 0);
         points.zip(inputs).for_each(|(point, value)| point.set(&mut image, *value));
         machine.step(&mut scratch, &mut state, &image, &mut outputs);
-        // The rest of the header counts the scans.
-        let kept = state.iter().skip(Program::HEADER as usize);
-        (state[0], kept.copied().collect(), outputs.clone())
+        let value = |part: &Part| part.stored(&state).map_or(0, |(_, stored)| stored);
+        std::iter::once(state[0]).chain(watched.iter().map(value)).collect::<Vec<u64>>()
     };
     for _ in 0..first {
         run(before);
@@ -145,10 +166,10 @@ fn states(
     scans.iter().map(run).collect()
 }
 
-/// Whether a program is in the same states in the scans with these inputs after any number of scans with those `before`.
-fn remains(program: &Program, before: &Inputs, scans: &[Inputs]) -> bool {
-    let alone = states(program, before, 0, scans);
-    TRIED.iter().all(|first| states(program, before, *first, scans) == alone)
+/// Whether scans with some inputs in front of those with the others change nothing that is watched there, however many they are.
+fn changes_nothing(program: &Program, watched: &[Part], before: &Inputs, scans: &[Inputs]) -> bool {
+    let alone = shown(program, watched, before, 0, scans);
+    TRIED.iter().all(|first| shown(program, watched, before, *first, scans) == alone)
 }
 
 /// The steps: the inputs before the run are set, the stations with a state of the programs are started again, the programs start cold, and then the

@@ -10,13 +10,12 @@ use crate::numbers::{Answer, Driven, Model};
 use crate::property::{Asked, Properties, read_one};
 
 /// Parts of a program, in any order.
-const PARTS: [&str; 8] = [
+const PARTS: [&str; 7] = [
     "IF a THEN x := x + 1; END_IF; IF x > 5 THEN x := 0; END_IF;",
     "IF n > x THEN t := TRUE; ELSIF n = x THEN t := FALSE; END_IF;",
     "x := LIMIT(0, x + n - 1, 5);",
     "IF t AND NOT a THEN x := n; END_IF;",
     "y := x * 2 - n;",
-    "wait(IN := t, PT := T#30ms); IF wait.Q THEN x := 5; END_IF;",
     "IF x = 3 THEN y := y + 1; END_IF; IF y > 4 THEN y := -2; END_IF;",
     "CASE x OF 0: t := a; 1..2: y := n; ELSE t := FALSE; END_CASE;",
 ];
@@ -75,6 +74,7 @@ impl<'a> Reference<'a> {
                 let mut state = states[at].clone();
                 let shown = reference.step(&mut state, inputs & 1, inputs >> 1);
                 let next = *known.entry(key(&state)).or_insert(states.len());
+                assert!(states.len() < 10_000, "too many states");
                 if next == states.len() {
                     states.push(state);
                     reference.depths.push(reference.depths[at] + 1);
@@ -147,19 +147,20 @@ impl<'a> Reference<'a> {
 fn verdicts_are_those_of_all_states() {
     let mut dice = Dice::new(11);
     let (mut held, mut failed) = (0, 0);
-    for _ in 0..60 {
+    for _ in 0..40 {
         let count = 2 + dice.below(3);
         let parts: Vec<&str> = (0..count).map(|_| dice.pick(&PARTS)).collect();
         let text = format!(
-            "PROGRAM p VAR_INPUT a : BOOL; n : INT (0..3); END_VAR VAR_OUTPUT x : INT; t : BOOL; y : INT; END_VAR VAR wait : TON; END_VAR\n{}\nEND_PROGRAM",
+            "PROGRAM p VAR_INPUT a : BOOL; n : INT (0..3); END_VAR VAR_OUTPUT x : INT; t : BOOL; y : INT; END_VAR\n{}\nEND_PROGRAM",
             parts.join("\n")
         );
         let program = lowered(&text);
         let reference = Reference::new(&program);
+        let read = PROPERTIES.iter().map(|(property, _)| read_one(property, PERIOD));
+        let properties = read.map(|read| read.expect("a property")).collect();
+        let asked = Properties { properties, ..Properties::default() };
+        let model = Model::of_program(&program, &Asked::of([&asked])).expect("followed");
         for (property, said) in &PROPERTIES {
-            let read = read_one(property, PERIOD).expect("a property");
-            let asked = Properties { properties: vec![read], ..Properties::default() };
-            let model = Model::of_program(&program, &Asked::of([&asked])).expect("followed");
             let (holds, shortest) = reference.judge(said);
             match (ask(&model, property), said) {
                 (Answer::Holds(_), _) => assert!(holds, "{property} is not so:\n{text}"),
@@ -175,5 +176,5 @@ fn verdicts_are_those_of_all_states() {
             failed += usize::from(!holds);
         }
     }
-    assert!(held > 100 && failed > 100, "{held} hold, {failed} fail");
+    assert!(held > 80 && failed > 80, "{held} hold, {failed} fail");
 }
