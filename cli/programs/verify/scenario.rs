@@ -1,7 +1,7 @@
 //! A counterexample as a scenario of a cluster: the program starts cold, and its inputs are set scan by scan.
 //!
 //! A program makes some scans between its cold start and the first set input, and how many is not known. Therefore a run has a scenario only where
-//! some inputs in front of it change nothing that the property speaks of; this is tried with the program itself.
+//! some inputs in front of it change nothing that the property names; this is tried with the program itself.
 
 use std::collections::BTreeSet;
 
@@ -122,7 +122,7 @@ impl<'a> Driver<'a> {
     }
 }
 
-/// The variables of a program that a property speaks of; its fault is watched in any case.
+/// The variables of a program that a property names; its fault is watched in any case.
 fn watched(program: &Program, name: &str, property: &Property) -> Result<Vec<Part>, String> {
     let own = |of: &str| Some(of.strip_prefix(name)?.strip_prefix('.')?.to_owned());
     let part = |of: &str| program.part(of).filter(|part| part.of.elementary().is_some());
