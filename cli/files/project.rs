@@ -134,7 +134,7 @@ pub(crate) fn is_project(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("plcproj"))
 }
 
-/// The files among `paths` that are programs together, each two or more, in their order. What cannot be read is none of them.
+/// The files among `paths` that are programs together, each two or more, in their order. Those that cannot be read are left out.
 pub(crate) fn groups(paths: &[&Path]) -> Vec<Vec<PathBuf>> {
     let files = paths.iter().filter(|path| !is_project(path) && !path.is_dir());
     let files = files.filter_map(|path| Some((path.display().to_string(), text(path).ok()?)));
