@@ -195,7 +195,7 @@ impl Joined {
             (place.saturating_sub(piece.start) + piece.from).min(length)
         };
         let start = moved(first, span.start);
-        let end = match span.end.checked_sub(1).and_then(|last| piece(last)) {
+        let end = match span.end.checked_sub(1).and_then(piece) {
             Some(last) if last.file == first.file => moved(last, span.end),
             _ => start,
         };
