@@ -1,5 +1,7 @@
 //! Reads and writes the files of a command.
 
+mod project;
+
 use std::borrow::Cow;
 use std::fs;
 use std::io;
@@ -9,20 +11,18 @@ use std::time::{Duration, SystemTime};
 
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_interchange::{
-    Joined, Rungs, Source, USUAL_PERIOD, Wanted, files_of_project, is_part, read_ladder,
-    read_source,
-};
+use understudy_interchange::{Source, USUAL_PERIOD, Wanted, read_ladder, read_source};
 use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
-use understudy_text::{Diagnostic, Report, decode, has_errors};
+use understudy_text::{Report, decode, has_errors};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
+pub(crate) use project::{ProgramFile, ProgramText, groups, is_project};
 
 /// The files that this command has read.
 static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -96,149 +96,6 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
     Some(folder.join(nearest))
 }
 
-/// The text of a program: of one file, or of the files of a TwinCAT project.
-pub(crate) struct ProgramText {
-    pub(crate) name: String,
-    pub(crate) text: String,
-    joined: Option<Joined>,
-}
-
-impl ProgramText {
-    /// The program in a file, in the files that a project (`.plcproj`) names, or in those of its folder.
-    ///
-    /// # Errors
-    /// If a file cannot be read, or one of a project is not well-formed.
-    pub(crate) fn of(path: &Path) -> Result<Self, Answer> {
-        let name = path.display().to_string();
-        match project(path)? {
-            Some(files) => Self::together(name, &files),
-            None => Ok(Self { text: text(path)?, name, joined: None }),
-        }
-    }
-
-    /// The same, where what it names must look like a program.
-    ///
-    /// # Errors
-    /// As [`Self::of`], and if the file is of another kind.
-    pub(crate) fn expected(path: &Path) -> Result<Self, Answer> {
-        let found = Self::of(path)?;
-        if found.is_one_file() {
-            kind::expect(Kind::Program, path, &found.text)?;
-        }
-        Ok(found)
-    }
-
-    /// Whether it is the text of one file.
-    pub(crate) fn is_one_file(&self) -> bool {
-        self.joined.is_none()
-    }
-
-    /// The files of a TwinCAT project.
-    pub(crate) fn together(name: String, files: &[PathBuf]) -> Result<Self, Answer> {
-        let mut texts = Vec::new();
-        for file in files {
-            texts.push((file.display().to_string(), text(file)?));
-        }
-        let joined = Joined::of(texts).map_err(Answer::bad_files)?;
-        Ok(Self { name, text: joined.text.clone(), joined: Some(joined) })
-    }
-
-    /// The file that what has no place is said of.
-    pub(crate) fn first_file(&self) -> &str {
-        self.joined.as_ref().and_then(Joined::first).unwrap_or(&self.name)
-    }
-
-    /// It with what was found in it.
-    pub(crate) fn found(self, diagnostics: Vec<Diagnostic>) -> ProgramFile {
-        let Self { name, text, joined } = self;
-        ProgramFile { report: Report { name, text, diagnostics }, rungs: None, joined }
-    }
-
-    /// What was found, file by file.
-    pub(crate) fn reports(self, diagnostics: Vec<Diagnostic>) -> Vec<Report> {
-        self.found(diagnostics).reports()
-    }
-}
-
-/// A program that was read, as one text, with what was found in it.
-pub(crate) struct ProgramFile {
-    pub(crate) report: Report,
-    /// The rungs that it is written in or drawn as.
-    pub(crate) rungs: Option<Rungs>,
-    joined: Option<Joined>,
-}
-
-impl ProgramFile {
-    /// What was found, file by file.
-    pub(crate) fn reports(self) -> Vec<Report> {
-        match self.joined {
-            Some(joined) => joined.reports(self.report.diagnostics),
-            None => vec![self.report],
-        }
-    }
-}
-
-/// The most files of a folder that are examined for those of a project.
-const MAXIMUM_FILES: usize = 20_000;
-
-/// Whether a path is the file of a TwinCAT project, by its end.
-pub(crate) fn is_project(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("plcproj"))
-}
-
-/// The files of a TwinCAT project, where the path is one: its file or its folder.
-fn project(path: &Path) -> Result<Option<Vec<PathBuf>>, Answer> {
-    if !path.is_dir() {
-        return if is_project(path) { named_by(path).map(Some) } else { Ok(None) };
-    }
-    let mut files = Vec::new();
-    let mut folders = vec![path.to_owned()];
-    let mut seen = 0;
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
-            seen += 1;
-            // A link may lead back.
-            let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-            match entry.path() {
-                _ if seen > MAXIMUM_FILES => {}
-                found if is_folder => folders.push(found),
-                found => files.push(found),
-            }
-        }
-    }
-    files.sort();
-    let mut projects = files.iter().filter(|file| is_project(file));
-    match (projects.next(), projects.next()) {
-        (Some(only), None) => named_by(only).map(Some),
-        (Some(first), Some(second)) => {
-            let message = format!(
-                "{} has several projects: name one, such as {} or {}",
-                path.display(),
-                first.display(),
-                second.display()
-            );
-            Err(Answer::failed(Status::BadInput, "U0601", message))
-        }
-        (None, _) => {
-            files.retain(|file| is_part(&file.to_string_lossy()));
-            Ok((!files.is_empty()).then_some(files))
-        }
-    }
-}
-
-/// The files that a project names.
-fn named_by(project: &Path) -> Result<Vec<PathBuf>, Answer> {
-    let text = text(project)?;
-    let folder = project.parent().unwrap_or(Path::new(""));
-    match files_of_project(&text) {
-        Ok(files) => Ok(files.iter().map(|file| folder.join(file)).collect()),
-        Err(found) => {
-            let name = project.display().to_string();
-            Err(Answer::bad_files(vec![Report { name, text, diagnostics: vec![found] }]))
-        }
-    }
-}
-
 /// What `check` lists of a program, or of a cluster and its programs, apart from what it searches for within its time limit.
 pub(crate) fn listed_by_check(path: &Path) -> Vec<Report> {
     if path.extension().is_some_and(|ending| ending == "toml") {
@@ -263,7 +120,8 @@ pub(crate) fn program(
     let file = ProgramText::expected(path)?;
     let period = |found: Option<Duration>| wanted.period.or(found).unwrap_or(USUAL_PERIOD);
     let read = read_source(&file.name, &file.text, wanted);
-    let file = ProgramFile { rungs: read.rungs, ..file.found(read.diagnostics) };
+    let mut file = file.found(read.diagnostics);
+    file.rungs = read.rungs;
     match read.source {
         Some(source) if !file.report.has_errors() => Ok((source, file, period(read.period))),
         _ => Err(Answer::bad_files(file.reports())),

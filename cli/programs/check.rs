@@ -12,9 +12,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Code, Overrides, SourceText};
-use understudy_interchange::{
-    Format, Source, USUAL_PERIOD, Wanted, is_part, read_source, unknown_form,
-};
+use understudy_interchange::{Format, Source, USUAL_PERIOD, Wanted, read_source, unknown_form};
 use understudy_journal::Members;
 use understudy_ladder::Program as Ladder;
 use understudy_scenarios::read;
@@ -45,8 +43,9 @@ Example:
   understudy check examples/boiler/main.ladder --rung-size 11x7
   understudy check examples/assembly-cell/model.toml examples/assembly-cell/net.toml examples/boiler/main-map.toml
   understudy check MAIN.TcPOU E_Mode.TcDUT
+  understudy check examples/other-tools/conveyor
 
-The files of a TwinCAT project are checked as one program: several files, its .plcproj or its folder. The programs of a cluster are checked with it. Names in a scenario are checked against the cluster file given with it, otherwise against the
+Files that use what another one declares are checked as one program, as are those of a TwinCAT project (.plcproj) or of a folder. The programs of a cluster are checked with it. Names in a scenario are checked against the cluster file given with it, otherwise against the
 cluster.toml in its folder. Ladder programs are also checked for rungs without effect, coils with conflicting values in one scan, and
 sequence steps that are passed in one scan; `understudy verify` shows example runs. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
@@ -142,17 +141,20 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let mut found = Found::default();
     let mut scenarios = Vec::new();
     let mut clusters = Vec::new();
-    // Types and blocks of TwinCAT stand in files of their own: several of them are one program.
-    let parts = arguments.files.iter().filter(|file| is_part(&file.to_string_lossy()));
-    let parts: Vec<PathBuf> = parts.cloned().collect();
-    let are_together = |path: &PathBuf| parts.len() > 1 && parts.contains(path);
+    // Types and blocks can be in files of their own: files that use each other are one program.
+    let named: Vec<&Path> = arguments.files.iter().map(PathBuf::as_path).collect();
+    let projects = files::groups(&named);
+    let parts: Vec<PathBuf> = projects.iter().flatten().cloned().collect();
     let program = arguments.program.as_deref();
-    if parts.len() > 1 {
-        let name = parts[0].display().to_string();
-        let text = ProgramText::together(name, &parts);
-        found.add_joined(&parts[0], text, program, &looking);
+    for files in &projects {
+        let name = files[0].display().to_string();
+        found.add_joined(&files[0], ProgramText::together(name, files), program, &looking);
     }
-    for path in arguments.files.iter().filter(|path| !are_together(path)) {
+    for path in &arguments.files {
+        if parts.contains(path) {
+            found.given.push((Kind::Program, path));
+            continue;
+        }
         if path.is_dir() || files::is_project(path) {
             let libraries = found.libraries.len();
             found.add_joined(path, ProgramText::of(path), program, &looking);
@@ -226,7 +228,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let given = std::mem::take(&mut found.given);
     let known = std::mem::take(&mut found.known);
     let libraries: Vec<PathBuf> = found.libraries.iter().map(|(name, _)| name.into()).collect();
-    let files = next::Files { given: &given, known: &known, libraries: &libraries };
+    let files = next::Files { given: &given, known: &known, parts: &parts, libraries: &libraries };
     next::after_check(found.answer(), arguments.program.as_deref(), &files)
 }
 
@@ -284,7 +286,7 @@ impl Found<'_> {
         }
     }
 
-    /// Reports on the files of a TwinCAT project, which are one program.
+    /// Reports on the files of a project, which are one program.
     fn add_joined(
         &mut self,
         path: &Path,

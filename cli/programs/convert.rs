@@ -24,6 +24,7 @@ Example:
   understudy convert examples/plcopen/pump.xml pump.ladder --fidelity
   understudy convert examples/press-cell/robot.ladder robot.xml
   understudy convert robot.xml robot.st --period 20ms
+  understudy convert examples/other-tools/conveyor conveyor.st
 
 The file extension determines the format: .ladder, .xml (PLCopen XML or digraph XML), .st (Structured Text), .ld (LDmicro).")]
 pub(crate) struct Arguments {
@@ -33,6 +34,9 @@ pub(crate) struct Arguments {
     /// Output file; default: standard output
     #[arg(value_name = "OUT")]
     to_file: Option<PathBuf>,
+    /// Further files of the project of IN, which are converted with it
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "from")]
+    with: Vec<PathBuf>,
     /// Format of IN
     #[arg(long, value_enum)]
     from: Option<Form>,
@@ -79,9 +83,14 @@ impl Form {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let first = &arguments.from_file;
     let joined = match arguments.from {
-        None => ProgramText::expected(&arguments.from_file)?,
-        Some(_) => ProgramText::of(&arguments.from_file)?,
+        None if !arguments.with.is_empty() => {
+            let files = [std::slice::from_ref(first), &arguments.with].concat();
+            ProgramText::together(first.display().to_string(), &files)?
+        }
+        None => ProgramText::expected(first)?,
+        Some(_) => ProgramText::of(first)?,
     };
     let (name, source) = (joined.name.clone(), joined.text.clone());
     let form_named = arguments.from.map(Form::format);

@@ -19,9 +19,12 @@ Example:
   understudy init level --template modbus
   understudy init line --from examples/plcopen/pump.xml examples/press-cell/press.ladder
   understudy init sites --from north=examples/plcopen/pump.xml south=examples/plcopen/pump.xml
+  understudy init belt --from examples/other-tools/conveyor --output jams
 
---from takes every program that `understudy check` finds right. Each program gets a controller, a remote I/O and a placeholder for its plant;
-a file with several programs gives one controller per program, unless they share variables. NAME= sets the name of the controller.")]
+--from takes every program that `understudy check` finds right: files, projects of TwinCAT (.plcproj) and folders. Files that use what another one
+declares are one project. Each program gets a controller, a remote I/O and a placeholder for its plant; a file with several programs gives one
+controller per program, unless they share variables. NAME= sets the name of the controller. --output makes a variable an output in the copy
+of the program.")]
 pub(crate) struct Arguments {
     /// Folder to create; existing files are not overwritten
     #[arg(value_name = "DIR")]
@@ -32,6 +35,9 @@ pub(crate) struct Arguments {
     /// Existing programs, instead of a template
     #[arg(long, value_name = "[NAME=]FILE", num_args = 1.., conflicts_with = "template")]
     from: Vec<PathBuf>,
+    /// Variables of the programs that are meant as outputs and declared as memory
+    #[arg(long, value_name = "[PROGRAM.]NAME", num_args = 1.., requires = "from")]
+    output: Vec<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
@@ -58,7 +64,7 @@ impl Template {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let folder = &arguments.folder;
     if !arguments.from.is_empty() {
-        return from::run(folder, &arguments.from);
+        return from::run(folder, &arguments.from, &arguments.output);
     }
     let paths = files::write_template(folder, arguments.template.files())?;
     let answer = written(folder, &paths, "");

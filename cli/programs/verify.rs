@@ -2,6 +2,7 @@
 
 mod answer;
 mod numbers;
+mod scenario;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -11,7 +12,9 @@ use serde_json::json;
 use understudy_bits::Disagreement;
 use understudy_cluster::{Cluster, Overrides};
 use understudy_interchange::{NOT_EXECUTED, Source, Wanted};
+use understudy_journal::Members;
 use understudy_ladder::{LowerError, Program};
+use understudy_scenarios::{Scenario, write};
 use understudy_text::duration::parse_positive;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
@@ -40,6 +43,7 @@ Example:
   understudy verify examples/heated-tank/temperature.st --property \"never heater > 100.0\" --assume \"level <= 2.0\"
   understudy verify examples/press-cell/cluster.toml
   understudy verify examples/two-shuttles/cluster.toml --property \"never left.inside and right.inside\"
+  understudy verify examples/press-cell/cluster.toml --property \"never press.move_up and press.move_down\" --scenario fails.toml
   understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s
   understudy verify examples/painting-system/painting-system.ladder --resources
 
@@ -87,6 +91,9 @@ pub(crate) struct Arguments {
     /// HTML page with all counterexamples and witnesses, drawn into the ladder scan by scan
     #[arg(long, value_name = "FILE.html", conflicts_with = "smv")]
     draw: Option<PathBuf>,
+    /// Scenario for `simulate` and `lab` in which the first property that fails does so as in its counterexample; FILE is a cluster file
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "smv")]
+    scenario: Option<PathBuf>,
     /// Write the program and its properties for NuSMV instead of proving them
     #[arg(long, value_enum)]
     smv: Option<Smv>,
@@ -108,6 +115,10 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let patience = Patience::new(arguments.budget, console).naming_budget();
     if is_cluster {
         return cluster(arguments, &patience);
+    }
+    if arguments.scenario.is_some() {
+        let message = "--scenario is for the programs of a cluster; name its cluster file, and its signals as `CONTROLLER.NAME`";
+        return Err(Answer::failed(Status::BadInput, "U0437", message));
     }
     let wanted = Wanted { period: arguments.period, program: arguments.program.as_deref() };
     let (source, mut file, period) = files::program(&arguments.file, wanted)?;
@@ -321,11 +332,15 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
     let go_on = |work| patience.goes_on(work);
     let bounds = bounds(arguments, &go_on);
     let is_asked = !arguments.property.is_empty() || arguments.properties.is_some();
+    if arguments.scenario.is_some() && !is_asked {
+        let message = "--scenario is of a property that fails; state one by --property";
+        return Err(Answer::failed(Status::BadInput, "U0437", message));
+    }
     if is_asked {
-        let together = numbers::of_cluster(arguments, &cluster, bounds, patience)?;
-        return Ok(answer::of_programs(vec![together], None, None, used(arguments, patience))
-            .with_used(reports)
-            .and_next(&[&"simulate", &arguments.file]));
+        let (together, scenario) = numbers::of_cluster(arguments, &cluster, bounds, patience)?;
+        let answer = answer::of_programs(vec![together], None, None, used(arguments, patience));
+        let answer = with_scenario(answer, arguments, &cluster, scenario)?;
+        return Ok(answer.with_used(reports).and_next(&[&"simulate", &arguments.file]));
     }
     let mut programs = Vec::new();
     for controller in cluster.controllers() {
@@ -346,6 +361,31 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
     Ok(answer::of_programs(programs, Some(understudy), None, used(arguments, patience))
         .with_used(reports)
         .and_next(&[&"simulate", &arguments.file]))
+}
+
+/// Writes the scenario of a counterexample where one is asked for, or says why there is none.
+fn with_scenario(
+    mut answer: Answer,
+    arguments: &Arguments,
+    cluster: &Cluster,
+    found: Option<Result<Scenario, String>>,
+) -> Result<Answer, Answer> {
+    let Some(path) = &arguments.scenario else {
+        return Ok(answer);
+    };
+    let name = path.display();
+    match found {
+        None => answer.text += &format!("\n{name} is not written: no property fails with a run"),
+        Some(Err(reason)) => answer.text += &format!("\n{name} is not written: {reason}"),
+        Some(Ok(scenario)) => {
+            let remark = "Written by `understudy verify --scenario`: the program starts cold, and its inputs are set scan by scan.";
+            let text = write(&scenario, &Members::of(cluster), &[remark.to_owned()]);
+            files::write_output(path, &text)?;
+            answer = answer.and_next(&[&"simulate", &arguments.file, &"--scenario", path]);
+            answer = answer.and_written(path);
+        }
+    }
+    Ok(answer)
 }
 
 /// What the proofs took, if it is asked for.

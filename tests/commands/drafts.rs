@@ -10,7 +10,10 @@ fn programs(folder: &Path, found: &mut Vec<PathBuf>) {
     let entries = fs::read_dir(folder).expect("a folder");
     for path in entries.map(|entry| entry.expect("an entry").path()) {
         if path.is_dir() {
-            programs(&path, found);
+            // Files of a project are no programs alone.
+            if !path.ends_with("other-tools/conveyor") {
+                programs(&path, found);
+            }
         } else if path.extension().is_some_and(|ending| {
             ["st", "xml", "ladder", "ld"].iter().any(|known| ending == *known)
         }) {

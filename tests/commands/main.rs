@@ -28,6 +28,7 @@ mod pasted;
 mod petri;
 mod points;
 mod program_faults;
+mod projects;
 mod reconfigure;
 mod rehearsal;
 mod reliability;

@@ -1,6 +1,7 @@
 //! Proofs of ladders as a person meets them.
 
 use std::fs;
+use std::path::Path;
 
 use insta::assert_snapshot;
 use serde_json::json;
@@ -403,4 +404,46 @@ fn a_count_is_compared_with_what_it_can_be() {
             assert!(answer.output.contains(&proved), "{}", answer.shown());
         }
     }
+}
+
+/// A counterexample of a cluster is a scenario in which the simulator drives the same outputs.
+#[test]
+fn a_counterexample_is_a_scenario() {
+    let folder = empty_folder("verify_scenario");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let cell = examples.join("press-cell/cluster.toml");
+    let cell = cell.to_str().expect("text");
+    let property = "never press.move_up and press.move_down";
+    let asked = ["verify", cell, "--property", property, "--scenario", "fails.toml"];
+    let failed = understudy_in(&folder, &asked);
+    assert_eq!(failed.status, 1, "{}", failed.shown());
+    let simulate = ["simulate", cell, "--scenario", "fails.toml", "--seed", "1", "--out", "runs"];
+    assert_eq!(understudy_in(&folder, &simulate).status, 0);
+    let journal = ["journal", "runs/latest", "--event", "applied", "--from", "599", "--to", "602"];
+    let applied = understudy_in(&folder, &journal).output;
+    let drives = |cycle: u64| {
+        let mut lines = applied.lines().map(str::trim_start);
+        let line =
+            lines.find(|line| line.starts_with(&format!("{cycle} ")) && line.contains("press-io"));
+        line.unwrap_or_default().to_owned()
+    };
+    assert!(drives(600).contains("drives 00"), "{applied}");
+    assert!(drives(601).contains("drives 11"), "{applied}");
+    // Nothing fails, nothing to fail, or programs that read each other: no scenario, and why.
+    let shuttles = examples.join("two-shuttles/cluster.toml");
+    let shuttles = shuttles.to_str().expect("text");
+    for (cluster, property, said) in [
+        (cell, "always press.move_up | !press.move_up", "no property fails"),
+        (cell, "never press.move_up and press.stop", "`press` misses a sample"),
+        (shuttles, "never left.grant", "reads signals of other programs"),
+    ] {
+        let asked = ["verify", cluster, "--property", property, "--scenario", "none.toml"];
+        let answer = understudy_in(&folder, &asked);
+        assert!(answer.output.contains(said), "{}", answer.shown());
+        assert!(!folder.join("none.toml").exists());
+    }
+    let alone = examples.join("press-cell/press.ladder");
+    let alone = alone.to_str().expect("text");
+    let asked = ["verify", alone, "--property", "never stop", "--scenario", "none.toml"];
+    assert!(understudy_in(&folder, &asked).errors.contains("U0437"));
 }

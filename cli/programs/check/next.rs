@@ -19,13 +19,15 @@ pub(super) struct Files<'a> {
     pub(super) given: &'a [(Kind, &'a Path)],
     /// What was read of those of one program.
     pub(super) known: &'a [Known<'a>],
+    /// Those that are a program only together with other ones.
+    pub(super) parts: &'a [PathBuf],
     /// Those without a program.
     pub(super) libraries: &'a [PathBuf],
 }
 
 /// `program` is the one that was chosen of a file with several.
 pub(super) fn after_check(answer: Answer, program: Option<&str>, files: &Files<'_>) -> Answer {
-    let Files { given, known, libraries } = files;
+    let Files { given, known, parts, libraries } = files;
     if answer.status != Status::Done {
         return answer;
     }
@@ -48,6 +50,9 @@ pub(super) fn after_check(answer: Answer, program: Option<&str>, files: &Files<'
             } else {
                 answer
             }
+        }
+        (None, None) if programs.iter().any(|path| parts.iter().any(|part| part == path)) => {
+            with_draft(answer, &programs, known)
         }
         (None, None) if !programs.is_empty() => match program {
             Some(program) => answer.and_next(&[&"verify", &programs[0], &"--program", &program]),

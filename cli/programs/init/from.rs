@@ -2,7 +2,7 @@
 //!
 //! Invariant: files are written only after every program was read and the drafted cluster was checked.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -11,9 +11,11 @@ use understudy_cluster::{
     Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
 };
 use understudy_interchange::{
-    Apart, Copies, Format, IDLE_PROGRAM, Source, USUAL_PERIOD, read_apart,
+    Apart, Copies, Format, IDLE_PROGRAM, NO_OUTPUT, OutputError, Source, USUAL_PERIOD, read_apart,
+    read_with_outputs,
 };
-use understudy_text::{Report, Severity, decode, duration};
+use understudy_text::spelling::suggestion;
+use understudy_text::{Report, Severity, decode, duration, has_errors};
 use understudy_wire::MAXIMUM_PROGRAMS;
 
 use super::written;
@@ -21,8 +23,12 @@ use crate::answer::{Answer, Failure};
 use crate::files::{self, NewFile, ProgramText};
 use crate::programs::convert::code;
 
-pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer> {
-    let (texts, found) = drafted(folder, arguments)?;
+pub(super) fn run(
+    folder: &Path,
+    arguments: &[PathBuf],
+    outputs: &[String],
+) -> Result<Answer, Answer> {
+    let (texts, found) = drafted(folder, arguments, outputs)?;
     let texts = texts.into_iter().map(|(name, text)| NewFile { name, bytes: text.into_bytes() });
     // A program that is already in the folder is used in place.
     let copies = found.copies.into_iter().filter(|copy| {
@@ -54,7 +60,7 @@ pub(crate) struct Known<'a> {
 /// is known of them.
 pub(crate) fn can_draft(folder: &Path, arguments: &[PathBuf], known: &[Known<'_>]) -> bool {
     let at_once = if arguments.len() == known.len() { follows(known) } else { None };
-    at_once.unwrap_or_else(|| drafted(folder, arguments).is_ok())
+    at_once.unwrap_or_else(|| drafted(folder, arguments, &[]).is_ok())
 }
 
 /// Whether a cluster can be drafted; nothing where this does not follow.
@@ -75,13 +81,18 @@ fn follows(known: &[Known<'_>]) -> Option<bool> {
     Some(!found.is_wrong())
 }
 
-/// The texts of the draft, which was checked, and what was found.
-fn drafted(folder: &Path, arguments: &[PathBuf]) -> Result<(Vec<(String, String)>, Found), Answer> {
+/// The texts of the draft, which was checked, and what was found; `outputs` are variables that are made outputs.
+fn drafted(
+    folder: &Path,
+    arguments: &[PathBuf],
+    outputs: &[String],
+) -> Result<(Vec<(String, String)>, Found), Answer> {
     let mut found = Found::default();
-    for argument in arguments {
-        found.read(&Given::new(argument));
+    for given in Given::all(arguments) {
+        found.read(&given, outputs);
     }
     found.check();
+    found.check_outputs(outputs);
     if found.is_wrong() {
         return Err(found.refusal());
     }
@@ -93,21 +104,48 @@ fn drafted(folder: &Path, arguments: &[PathBuf]) -> Result<(Vec<(String, String)
     Ok((texts, found))
 }
 
-/// A file named on the command line.
+/// A file named on the command line, or the files of a project.
 struct Given<'a> {
     name: Option<&'a str>,
     path: PathBuf,
+    /// All files, where it is a program only together with other ones.
+    files: Vec<PathBuf>,
 }
 
 impl<'a> Given<'a> {
     /// `NAME=FILE` or a file. An existing file whose name contains `=` is a file.
     fn new(argument: &'a Path) -> Self {
         let split = argument.to_str().and_then(|text| text.split_once('='));
-        match split {
+        let (name, path) = match split {
             Some((name, file)) if !argument.exists() && !name.contains('/') => {
-                Self { name: Some(name), path: file.into() }
+                (Some(name), file.into())
             }
-            _ => Self { name: None, path: argument.to_owned() },
+            _ => (None, argument.to_owned()),
+        };
+        Self { name, path, files: Vec::new() }
+    }
+
+    /// Files that use each other are one project, in place of its first file; the first name among them is its name.
+    fn all(arguments: &'a [PathBuf]) -> Vec<Self> {
+        let mut all: Vec<Self> = arguments.iter().map(|argument| Self::new(argument)).collect();
+        let paths: Vec<&Path> = all.iter().map(|given| given.path.as_path()).collect();
+        for files in files::groups(&paths) {
+            let is_part = |given: &Self| files.contains(&given.path);
+            let name = all.iter().filter(|given| is_part(given)).find_map(|given| given.name);
+            all.retain(|given| !is_part(given) || given.path == files[0]);
+            if let Some(first) = all.iter_mut().find(|given| given.path == files[0]) {
+                first.name = name;
+                first.files = files;
+            }
+        }
+        all
+    }
+
+    /// Its text, where it looks like a program.
+    fn text(&self) -> Result<ProgramText, Answer> {
+        match self.files.as_slice() {
+            [] => ProgramText::expected(&self.path),
+            files => ProgramText::together(self.path.display().to_string(), files),
         }
     }
 
@@ -159,12 +197,15 @@ struct Found {
     periods: Vec<Duration>,
     reports: Vec<Report>,
     failures: Vec<Failure>,
+    /// The wanted outputs that a program has.
+    outputs: HashSet<String>,
+    /// Names of variables that could be outputs.
+    memory: Vec<String>,
 }
 
 impl Found {
-    fn read(&mut self, given: &Given<'_>) {
-        let path = &given.path;
-        let file = match ProgramText::expected(path) {
+    fn read(&mut self, given: &Given<'_>, outputs: &[String]) {
+        let file = match given.text() {
             Ok(read) => read,
             Err(answer) => {
                 self.failures.extend(answer.failures);
@@ -174,7 +215,22 @@ impl Found {
         };
         // The files of a project become one text.
         let copies = if file.is_one_file() { Copies::AsRead } else { Copies::Written };
-        let (programs, diagnostics) = read_apart(&file.name, &file.text, copies);
+        let (mut programs, diagnostics) = read_apart(&file.name, &file.text, copies);
+        if !outputs.is_empty() && !has_errors(&diagnostics) {
+            match read_with_outputs(&file.name, &file.text, outputs) {
+                Ok(None) => {}
+                Ok(Some(changed)) => {
+                    self.outputs.extend(changed.outputs);
+                    programs = changed.programs;
+                }
+                Err(OutputError::Write(error)) => {
+                    self.fail(code(&error), format!("{}: {error}", file.name));
+                }
+                Err(OutputError::Refused(code, reason)) => {
+                    self.fail(code, format!("{}: {reason}", file.name));
+                }
+            }
+        }
         let mut file = file.found(diagnostics);
         let is_only = programs.len() == 1;
         for program in programs {
@@ -220,14 +276,15 @@ impl Found {
     /// Takes a program of a file, with the name that it has there.
     fn take(&mut self, given: &Given<'_>, drafted: DraftProgram, unit: &str, source: &Source) {
         if !drafted.has_outputs() {
-            let such_as = memory(source).map(|name| format!(", such as `{name}`"));
+            let such_as = memory(source).next().map(|name| format!(", such as `{name}`"));
             let message = format!(
-                "{}: the program `{unit}` has no outputs to protect; declare what it computes{} as outputs (VAR_OUTPUT, or AT %Q…) or omit the program",
+                "{}: the program `{unit}` has no outputs to protect; name what it computes{} with --output, declare it as an output (VAR_OUTPUT, or AT %Q…) or omit the program",
                 given.path.display(),
                 such_as.unwrap_or_default()
             );
             self.fail("U0622", message);
         }
+        self.memory.extend(memory(source).map(str::to_owned));
         self.sources.push(given.path.clone());
         self.programs.push(drafted);
     }
@@ -273,6 +330,27 @@ impl Found {
         }
         for (code, message) in failures {
             self.fail(code, message);
+        }
+    }
+
+    /// Every wanted output is a variable of a program.
+    fn check_outputs(&mut self, wanted: &[String]) {
+        if self.reports.iter().any(Report::has_errors) {
+            return;
+        }
+        let lacking = wanted.iter().filter(|output| !self.outputs.contains(*output));
+        for output in lacking.collect::<Vec<_>>() {
+            let (_, name) = output.rsplit_once('.').unwrap_or(("", output));
+            let message = match self.memory.iter().any(|known| known.eq_ignore_ascii_case(name)) {
+                true => format!(
+                    "--output {output}: only a variable of a PROGRAM or a global one becomes an output, and none at an address (AT %M…); declare it at an address in %Q"
+                ),
+                false => format!(
+                    "--output {output}: no program has a variable of this name in its memory or among its global variables; {}",
+                    suggestion(output, self.memory.iter().map(String::as_str))
+                ),
+            };
+            self.fail(NO_OUTPUT, message);
         }
     }
 
@@ -322,15 +400,16 @@ impl Found {
     }
 }
 
-/// A variable that is no input, of a program without outputs.
-fn memory(source: &Source) -> Option<&str> {
-    match source {
-        Source::Program(typed) => {
-            let mut variables = typed.variables.iter().map(|variable| variable.name.as_str());
-            variables.find(|name| typed.inputs.find(name).is_none())
-        }
+/// Variables of a program that are neither inputs nor outputs.
+fn memory(source: &Source) -> impl Iterator<Item = &str> {
+    let typed = match source {
+        Source::Program(typed) => Some(typed),
         Source::Library(_) => None,
-    }
+    };
+    typed.into_iter().flat_map(|typed| {
+        let names = typed.variables.iter().map(|variable| variable.name.as_str());
+        names.filter(|name| typed.inputs.find(name).or(typed.outputs.find(name)).is_none())
+    })
 }
 
 /// File extension of a copy, with the format of the original.

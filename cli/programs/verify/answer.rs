@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_logic::Circuit;
-use understudy_verification::numbers::{Answer as NumbersProof, Model, Run};
+use understudy_verification::numbers::{Answer as NumbersProof, Driven, Model, Run};
 use understudy_verification::program::{
     Answer as Proof, Bounds, Lamp, OutputFinding, Remarks, Subject,
 };
@@ -30,6 +30,8 @@ pub(crate) struct Verification {
     proved: bool,
     /// Page of runs.
     page: Option<String>,
+    /// Scenario in which a property of a cluster fails, with `--scenario`.
+    file: Option<String>,
     /// What the proofs took, with `--resources`.
     resources: Option<Resources>,
 }
@@ -131,6 +133,8 @@ pub(crate) struct Scans {
     table: String,
     #[serde(skip)]
     trace: Trace,
+    #[serde(skip)]
+    inputs: Vec<Driven>,
 }
 
 impl Scans {
@@ -146,6 +150,7 @@ impl Scans {
             again_from: trace.again_from,
             table: scan_table(circuit, trace),
             trace: trace.clone(),
+            inputs: Vec::new(),
         }
     }
 
@@ -156,6 +161,7 @@ impl Scans {
             let _ = writeln!(scans.table, "{}: {}", row.name, values(&row.values));
             scans.numbers.insert(row.name.clone(), row.values.clone());
         }
+        scans.inputs.clone_from(&run.inputs);
         scans
     }
 }
@@ -341,6 +347,12 @@ impl Finding {
         Self::told(circuit, property, formula, verdict, message, scans)
     }
 
+    /// All inputs of the run in which it fails, and the scan to which it returns.
+    pub(super) fn counterexample(&self) -> Option<(&[Driven], Option<usize>)> {
+        let scans = self.scans.as_ref().filter(|_| self.verdict == "fails")?;
+        Some((scans.inputs.as_slice(), scans.again_from))
+    }
+
     /// Says of a property that fails that it is about inputs alone, where it is.
     pub(super) fn of_inputs(mut self, is_of_inputs: bool) -> Self {
         if is_of_inputs && self.verdict == "fails" {
@@ -426,6 +438,7 @@ pub(super) fn of_programs(
         understudy_verdict,
         proved: right,
         page,
+        file: None,
         resources,
     };
     Answer::done(text.trim_end().to_owned(), result).with_status(status)

@@ -5,6 +5,7 @@ use std::time::Duration;
 use serde_json::json;
 use understudy_bits::{Inexact, Member, Source};
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
+use understudy_scenarios::Scenario;
 use understudy_typed::{Elementary, Point, Program};
 use understudy_verification::numbers::Model;
 use understudy_verification::program::{Bounds, OutputFinding};
@@ -13,6 +14,7 @@ use understudy_verification::smv;
 use understudy_verification::symbolic::{Resolved, Signal};
 
 use super::answer::{self, Finding, ProgramAnswer};
+use super::scenario;
 use super::{Arguments, Smv, Texts, ToProve, bounds, used};
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramFile};
@@ -95,7 +97,7 @@ pub(super) fn of_cluster(
     cluster: &Cluster,
     bounds: Bounds<'_>,
     patience: &Patience<'_>,
-) -> Result<ProgramAnswer, Answer> {
+) -> Result<(ProgramAnswer, Option<Result<Scenario, String>>), Answer> {
     patience.turn_to("the programs together".to_owned());
     let period = cluster.agreement().schedule.period();
     let texts = Texts::read(arguments, period)?;
@@ -105,9 +107,16 @@ pub(super) fn of_cluster(
     let wrong = |assumed: &Property| model.wrong_assumption(assumed);
     let asked = texts.resolved(&|property| model.resolve(property), &wrong)?;
     let name = "all programs together";
+    let properties: Vec<Property> =
+        asked.properties.iter().map(|(property, _)| property.clone()).collect();
     let mut proved = prove(&model, name, asked, bounds, patience);
     proved.starts_together = members.len() > 1;
-    Ok(proved)
+    let mut runs = properties.iter().zip(&proved.properties);
+    let scenario = runs.find_map(|(property, finding)| {
+        let (run, again_from) = finding.counterexample()?;
+        Some(scenario::of_run(cluster, property, run, again_from))
+    });
+    Ok((proved, scenario))
 }
 
 fn prove(

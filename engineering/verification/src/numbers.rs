@@ -27,7 +27,7 @@ use crate::symbolic::{Cone, Resolved, Signal, Trace, resolve};
 use compared::Refused;
 pub use difference::Difference;
 use replay::Replay;
-pub use replay::Row;
+pub use replay::{Driven, Row};
 
 /// What came of one property.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +47,8 @@ pub struct Run {
     pub trace: Trace,
     /// Numbers of the run: inputs, and outputs that are no BOOLs.
     pub numbers: Vec<Row>,
+    /// Every input of the run, of the programs and of what fails between them.
+    pub inputs: Vec<Driven>,
 }
 
 /// A system and its derivation, ready for questions.

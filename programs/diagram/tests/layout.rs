@@ -180,7 +180,7 @@ fn random_chart(dice: &mut Dice) -> Chart {
             all
         };
         let (from, to) = (some(), some());
-        transitions.push(Transition { condition: "a AND b".to_owned(), from, to });
+        transitions.push(Transition { condition: "a AND b".to_owned(), from, to, truth: None });
     }
     Chart { steps, transitions }
 }

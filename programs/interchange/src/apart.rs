@@ -13,6 +13,7 @@ use understudy_text::{Diagnostic, Severity, has_errors};
 use crate::format::Format;
 use crate::plcopen;
 use crate::source::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
+use crate::twincat;
 use crate::typed_text::{Bodies, parsed, typed_text_with};
 use crate::written::{WriteError, Written, write};
 
@@ -173,7 +174,7 @@ impl Text<'_> {
 /// Names of the programs that the tasks of a file run; of those that no other calls, where it has no tasks.
 fn programs(name: &str, text: &str, file: &File) -> Vec<String> {
     let mut names = match Format::of(name, text) {
-        Some(Format::PlcOpen) => plcopen::programs(text),
+        Some(Format::PlcOpen) if !twincat::is_one(text) => plcopen::programs(text),
         _ => Vec::new(),
     };
     if names.is_empty() {
@@ -277,7 +278,7 @@ fn reached<'a>(
 }
 
 /// Names and addresses in a text, in capitals.
-fn words(text: &str) -> HashSet<String> {
+pub(crate) fn words(text: &str) -> HashSet<String> {
     let text = text.to_ascii_uppercase();
     let is_part = |letter: char| letter.is_alphanumeric() || letter == '_';
     let mut words = HashSet::new();

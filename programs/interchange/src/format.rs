@@ -67,6 +67,8 @@ impl Format {
     pub fn of(name: &str, text: &str) -> Option<Self> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         match Self::of_ending(name) {
+            // The document of a project may have the name of one of its files.
+            _ if twincat::is_one(start) => Some(Self::PlcOpen),
             Some(Self::StructuredText) => Some(Self::StructuredText),
             Some(Self::PlcOpen) => Some(Self::of_xml(start)),
             _ if start.starts_with('<') => Some(Self::of_xml(start)),

@@ -25,6 +25,7 @@ use understudy_structured_text::syntax::UnitKind;
 use understudy_text::{Diagnostic, Severity, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
+pub(crate) use typed::read_document;
 pub use typed::{drawn_units, read_typed};
 pub use understudy_text::xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 pub(crate) use write::confirm_order;

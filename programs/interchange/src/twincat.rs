@@ -1,11 +1,9 @@
-//! The files of TwinCAT, `.TcPOU`, `.TcGVL`, `.TcDUT` and `.TcIO`: XML around Structured Text.
+//! The files of TwinCAT, `.TcPOU`, `.TcGVL`, `.TcDUT` and `.TcIO`: XML around Structured Text; and the document of a project.
 //!
 //! Declarations and bodies are texts; a body in another language is refused by its name, as are properties and transitions.
 
-mod project;
-
 use understudy_structured_text::parser::{
-    parse_body_at, parse_declarations_at, parse_statements_at,
+    parse_at, parse_body_at, parse_declarations_at, parse_statements_at,
 };
 use understudy_structured_text::syntax::{
     Body, File, Name, ProgramInstance, Retention, Task, Unit, UnitKind,
@@ -13,19 +11,30 @@ use understudy_structured_text::syntax::{
 use understudy_text::Diagnostic;
 use understudy_text::xml::Node;
 
-pub use self::project::{Joined, files_of_project, is_part};
+use crate::plcopen::read_document;
 use crate::plcopen::xml::{attribute, child, children, elements, parse, start_tag, text, word};
 
-/// What every file of TwinCAT has as its root.
-const ROOT: &str = "TcPlcObject";
+/// What every file of TwinCAT has as its root, and the document of a project.
+pub(crate) const ROOT: &str = "TcPlcObject";
+
+/// A Structured Text in the document of a project.
+pub(crate) const TEXT: &str = "StructuredText";
+
+/// Behind the name of a library, its program for the pictures of a visualisation.
+const VISUALISATION: &str = ".Visu_Prg";
 
 /// Elements that change nothing: folders, and where lines are.
 const READ_PAST: [&str; 4] = ["Folder", "LineIds", "ObjectProperties", "Data"];
 
-/// Reads a file of TwinCAT with everything that is wrong with it; none where the text is none.
-pub(crate) fn read(text: &str) -> Option<(File, Vec<Diagnostic>)> {
+/// Whether a text can be a file of TwinCAT, or the document of a project.
+pub(crate) fn is_one(text: &str) -> bool {
     let start = text.trim_start_matches('\u{feff}').trim_start();
-    if !start.starts_with('<') || !start.contains(ROOT) {
+    start.starts_with('<') && start.contains(ROOT)
+}
+
+/// Reads a file of TwinCAT, or the files of a project, with everything that is wrong with it; none where the text is none.
+pub(crate) fn read(text: &str) -> Option<(File, Vec<Diagnostic>)> {
+    if !is_one(text) {
         return None;
     }
     let document = match parse(text) {
@@ -43,9 +52,13 @@ pub(crate) fn read(text: &str) -> Option<(File, Vec<Diagnostic>)> {
             "GVL" | "DUT" => reader.declarations(object),
             "Task" => reader.task(object),
             "Itf" => reader.interface(object),
+            TEXT => reader.text(object),
+            "Compile" => reader.missing(object),
+            "project" => {}
             name => reader.foreign(name, object),
         }
     }
+    reader.documents(root);
     reader.diagnostics.sort_by_key(|found| found.span.start);
     Some((reader.file, reader.diagnostics))
 }
@@ -61,6 +74,36 @@ impl Reader {
         let message = format!("the element `{name}` of TwinCAT is not supported");
         let error = Diagnostic::error("U1010", message, start_tag(node));
         self.diagnostics.push(error);
+    }
+
+    /// A file that a project names and that could not be read.
+    fn missing(&mut self, object: Node<'_, '_>) {
+        let name = attribute(object, "Include");
+        let name = name.map(|name| name.replace('\\', "/")).unwrap_or_default();
+        let message = format!("the file `{name}` of the project is missing, or cannot be read");
+        let error = Diagnostic::error("U1090", message, start_tag(object));
+        self.diagnostics.push(error.with_help("restore it, or remove it from the project"));
+    }
+
+    /// A Structured Text of a project.
+    fn text(&mut self, object: Node<'_, '_>) {
+        let passage = text(object);
+        let (file, found) = parse_at(passage.as_str(), &|span| passage.place(span));
+        self.diagnostics.extend(found);
+        self.file.append(file);
+    }
+
+    /// The PLCopen documents of a project. What the others declare is known before any body is read.
+    fn documents(&mut self, root: Node<'_, '_>) {
+        let documents: Vec<Node<'_, '_>> = children(root, "project").collect();
+        for (at, document) in documents.iter().enumerate() {
+            let mut known = self.file.clone();
+            let others = documents.iter().enumerate().filter(|(other, _)| *other > at);
+            others.for_each(|(_, other)| known.append(read_document(*other, &File::default()).0));
+            let (file, found) = read_document(*document, &known);
+            self.file.append(file);
+            self.diagnostics.extend(found);
+        }
     }
 
     /// An interface, of which the name is kept.
@@ -106,6 +149,11 @@ impl Reader {
         });
         for called in children(object, "PouCall").filter_map(|call| child(call, "Name")) {
             let of = word(called);
+            if of.ends_with(VISUALISATION) {
+                let message = format!("`{}` draws pictures, and is not executed", of.as_str());
+                self.diagnostics.push(Diagnostic::warning("U1055", message, of.span()));
+                continue;
+            }
             let of = Name::new(of.as_str(), of.span());
             let task = Some(name.clone());
             let retention = Retention::Unstated;

@@ -83,6 +83,31 @@ pub struct File {
     pub read_past: Vec<Span>,
 }
 
+impl File {
+    /// Adds what another text declares.
+    pub fn append(&mut self, other: Self) {
+        let Self { units, globals, types, tasks, instances, interfaces, read_past } = other;
+        self.units.extend(units);
+        self.globals.extend(globals);
+        self.types.extend(types);
+        self.tasks.extend(tasks);
+        self.instances.extend(instances);
+        self.interfaces.extend(interfaces);
+        self.read_past.extend(read_past);
+    }
+
+    /// Removes what was there of `before`, at the beginning of each list.
+    pub fn remove_first(&mut self, before: &Self) {
+        self.units.drain(..before.units.len());
+        self.globals.drain(..before.globals.len());
+        self.types.drain(..before.types.len());
+        self.tasks.drain(..before.tasks.len());
+        self.instances.drain(..before.instances.len());
+        self.interfaces.drain(..before.interfaces.len());
+        self.read_past.drain(..before.read_past.len());
+    }
+}
+
 /// What a unit is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UnitKind {

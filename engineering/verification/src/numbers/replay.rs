@@ -30,6 +30,15 @@ pub struct Row {
     pub values: Vec<String>,
 }
 
+/// An input in each scan of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Driven {
+    /// Its name; of several programs behind the name of its controller and a dot.
+    pub name: String,
+    /// Its values, as they are stored.
+    pub values: Vec<u64>,
+}
+
 /// What came of repeating a run.
 pub(super) struct Followed {
     /// The run with numbers, where every value of it is known.
@@ -360,6 +369,10 @@ impl<'s> Replay<'s> {
             }
         });
         let scans_of_trace = rows.collect();
+        let inputs = self.system.inputs.iter().enumerate().map(|(place, input)| Driven {
+            name: input.name.clone(),
+            values: scans.iter().map(|scan| scan.inputs[place]).collect(),
+        });
         Run {
             trace: Trace {
                 signals,
@@ -367,6 +380,7 @@ impl<'s> Replay<'s> {
                 again_from: trace.again_from.filter(|_| !is_broken),
             },
             numbers: self.numbers(trace, scans),
+            inputs: inputs.collect(),
         }
     }
 

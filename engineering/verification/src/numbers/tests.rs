@@ -1,6 +1,7 @@
 //! Properties of programs with numbers.
 
 mod compared;
+mod exhaustive;
 
 use std::time::Duration;
 

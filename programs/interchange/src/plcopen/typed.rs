@@ -32,6 +32,8 @@ const FIRST_EDITION: &str = "http://www.plcopen.org/xml/tc6.xsd";
 /// What is being read.
 struct Typed {
     file: File,
+    /// Units in front that are not of the document.
+    known: usize,
     diagnostics: Vec<Diagnostic>,
     notes: Vec<(String, Range<usize>)>,
 }
@@ -53,11 +55,20 @@ pub fn read_typed(text: &str) -> (File, Vec<Diagnostic>) {
 
 /// Reads of a document the units of these names, in capitals; all of them where none are given.
 pub(super) fn read_typed_of(text: &str, units: Option<&HashSet<String>>) -> ReadFile {
-    let document = match xml::parse(text) {
-        Ok(document) => document,
-        Err(error) => return ReadFile { diagnostics: vec![error], ..ReadFile::default() },
-    };
-    let root = document.root_element();
+    match xml::parse(text) {
+        Ok(document) => read_root(document.root_element(), units, &File::default()),
+        Err(error) => ReadFile { diagnostics: vec![error], ..ReadFile::default() },
+    }
+}
+
+/// Reads a document that is an element of another one, where `known` is declared outside of it.
+pub(crate) fn read_document(root: Node<'_, '_>, known: &File) -> (File, Vec<Diagnostic>) {
+    let read = read_root(root, None, known);
+    (read.file, read.diagnostics)
+}
+
+fn read_root(root: Node<'_, '_>, units: Option<&HashSet<String>>, known: &File) -> ReadFile {
+    let text = root.document().input_text();
     let namespace = root.tag_name().namespace().unwrap_or_default();
     let is_known = NAMESPACES.contains(&namespace) || namespace == FIRST_EDITION;
     if root.tag_name().name() != "project" || !is_known {
@@ -69,9 +80,15 @@ pub(super) fn read_typed_of(text: &str, units: Option<&HashSet<String>>) -> Read
         let help = format!("it should be `project` in the namespace {:?}", NAMESPACES[0]);
         return ReadFile { diagnostics: vec![error.with_help(help)], ..ReadFile::default() };
     }
-    let mut typed = Typed { file: File::default(), diagnostics: Vec::new(), notes: Vec::new() };
+    let mut typed = Typed {
+        file: known.clone(),
+        known: known.units.len(),
+        diagnostics: Vec::new(),
+        notes: Vec::new(),
+    };
     account::check(root, &mut typed.diagnostics);
     typed.project(root, units);
+    typed.file.remove_first(known);
     let mut diagnostics = typed.diagnostics;
     for found in &mut diagnostics {
         within(text, &mut found.span);
@@ -88,24 +105,22 @@ pub(super) fn read_typed_of(text: &str, units: Option<&HashSet<String>>) -> Read
     ReadFile { file: typed.file, diagnostics, notes }
 }
 
-/// The units of a document whose bodies are ladders or function blocks, in capitals.
+/// The units of a document, or of those of a project, whose bodies are ladders or function blocks, in capitals.
 pub fn drawn_units(text: &str) -> HashMap<String, Style> {
     let Ok(document) = xml::parse(text) else {
         return HashMap::new();
     };
-    let (project, _) = document::read_bodies(document.root_element());
-    let drawn = project.pous.iter().filter_map(|pou| {
-        let Some(Drawn::Graph(graph)) = &pou.body else {
-            return None;
-        };
-        let style = match graph.language {
-            Language::Ladder => Style::Ladder,
-            Language::FunctionBlocks => Style::Blocks,
-            Language::Sequence => return None,
-        };
-        Some((pou.name.to_uppercase(), style))
-    });
-    drawn.collect()
+    let style = |pou: &Pou| match &pou.body {
+        Some(Drawn::Graph(graph)) => match graph.language {
+            Language::Ladder => Some(Style::Ladder),
+            Language::FunctionBlocks => Some(Style::Blocks),
+            Language::Sequence => None,
+        },
+        _ => None,
+    };
+    let projects = xml::projects(document.root_element());
+    let pous = projects.flat_map(|project| document::read_bodies(project).0.pous);
+    pous.filter_map(|pou| Some((pou.name.to_uppercase(), style(&pou)?))).collect()
 }
 
 impl Typed {
@@ -165,7 +180,7 @@ impl Typed {
             self.globals(list);
         }
         self.surroundings();
-        for (at, pou) in project.pous.iter().enumerate() {
+        for (at, pou) in (self.known..).zip(&project.pous) {
             self.body(at, pou, project.lacks_instances);
         }
     }

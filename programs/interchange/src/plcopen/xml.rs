@@ -14,6 +14,12 @@ pub(crate) fn parse(text: &str) -> Result<Document<'_>, Diagnostic> {
     understudy_text::xml::parse(text, "U1001")
 }
 
+/// The PLCopen documents in a document: it, or those among the files of a project.
+pub(crate) fn projects<'a, 'i>(root: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    let is_one = root.tag_name().name() == "project";
+    is_one.then_some(root).into_iter().chain(children(root, "project").filter(move |_| !is_one))
+}
+
 /// An attribute with its place, without the white space around it.
 pub(crate) fn attribute(node: Node<'_, '_>, name: &str) -> Option<Name> {
     let attribute = node.attribute_node(name)?;

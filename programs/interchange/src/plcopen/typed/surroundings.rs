@@ -65,7 +65,7 @@ impl Typed {
     }
 
     fn variables_of_units(&self) -> impl Iterator<Item = &Declaration> {
-        self.file.units.iter().flat_map(|unit| &unit.declarations)
+        self.file.units.iter().skip(self.known).flat_map(|unit| &unit.declarations)
     }
 
     /// Where a variable of that type is declared first.
