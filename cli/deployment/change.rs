@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum, value_parser};
 use serde_json::{Value, json};
-use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides};
+use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides, Way};
 use understudy_journal::kept_overrides;
 use understudy_text::duration::parse_positive;
 use understudy_view::{Run, ViewError};
@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let said = said.map_err(ViewError::from)?.unwrap_or_default();
     let (after, used) = files::cluster(&arguments.after, said)?;
     let texts = ChangeTexts::between(&before, &after).map_err(|reasons| needs_stop(&reasons))?;
-    let plan = Plan::of(&before, &after, &texts);
+    let plan = Plan::of(&before, &after, &texts, Way::There);
     if arguments.step == Step::Plan {
         let live = run.as_ref().and_then(newest_states);
         let budget = arguments.budget;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Map, Value, json};
 use understudy_bits::{Switch, System};
 use understudy_cluster::{
-    ChangeTexts, ChangedPoint, Cluster, CommonPoints, Controller, PointFate, changed_points,
+    ChangeTexts, ChangedPoint, Cluster, CommonPoints, Controller, PointFate, Way, changed_points,
     nearest_of, origins, states_at_change,
 };
 use understudy_typed::Program;
@@ -93,7 +93,7 @@ impl Differences {
                     state.as_ref().map(|(_, state)| state.as_slice()),
                     bounds,
                 ),
-                lone: changed_points(before, after, changed.program)
+                lone: changed_points(before, after, changed.program, Way::There)
                     .into_iter()
                     .filter(ChangedPoint::is_lone_output)
                     .collect(),
@@ -121,7 +121,7 @@ fn outcome(
     bounds: Bounds<'_>,
 ) -> Result<Vec<OfOutput>, String> {
     let (old, new) = (&controllers.0.code, &controllers.1.code);
-    let same = CommonPoints::of(controllers.0, controllers.1).names();
+    let same = CommonPoints::of(controllers.0, controllers.1, Way::There).names();
     let (states, taken);
     let switch = match state {
         Some(state) => {

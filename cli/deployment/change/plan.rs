@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 use understudy_cluster::{
     ChangeTexts, ChangedInitial, ChangedPoint, ChangedSetting, Cluster, CommonPoints, PointFate,
-    changed_fallbacks, changed_initials, changed_points, done_pairs, fates, later_settings,
+    Way, changed_fallbacks, changed_initials, changed_points, done_pairs, fates, later_settings,
 };
 use understudy_typed::{CarriedPath, Fate, Renamed};
 
@@ -36,15 +36,15 @@ struct PlannedProgram {
 }
 
 impl Plan {
-    pub(super) fn of(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
+    pub(super) fn of(before: &Cluster, after: &Cluster, texts: &ChangeTexts, way: Way) -> Self {
         let programs = texts.programs.iter().map(|changed| {
             let place = changed.program.index();
             let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
-            let paths = fates(&old.code, &new.code);
+            let paths = fates(&old.code, &new.code, way);
             let initials = changed_initials(&old.code, &new.code, &paths);
-            let points = changed_points(before, after, changed.program);
+            let points = changed_points(before, after, changed.program, way);
             let done = done_pairs(&old.code, &new.code);
-            let common = CommonPoints::of(old, new);
+            let common = CommonPoints::of(old, new, way);
             let ended_alarms = before.alarms().iter().filter(|alarm| {
                 let stay = if alarm.is_output { &common.outputs } else { &common.inputs };
                 alarm.program == changed.program
@@ -68,7 +68,7 @@ impl Plan {
 
     /// The way back, without the variables that only the new program has.
     pub(super) fn back(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
-        let mut plan = Self::of(after, before, texts);
+        let mut plan = Self::of(after, before, texts, Way::Back);
         for program in &mut plan.programs {
             program.paths.retain(|path| path.now.is_some());
         }

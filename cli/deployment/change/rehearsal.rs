@@ -1,6 +1,6 @@
 //! `understudy change … rehearse`: what the new programs would have done in a run.
 
-use understudy_cluster::{ChangeTexts, Cluster, changed_points};
+use understudy_cluster::{ChangeTexts, Cluster, Way, changed_points};
 use understudy_view::{Bounds, Following, Model, Rehearsal, Run};
 
 use super::{Arguments, pause};
@@ -27,7 +27,7 @@ pub(super) fn rehearse(
         let controller = &before.controllers()[changed.program.index()];
         let points = (controller.interface.inputs.clone(), controller.interface.outputs.clone());
         let program = changed.program;
-        let points_of = changed_points(before, after, program);
+        let points_of = changed_points(before, after, program, Way::There);
         let lone = points_of.iter().filter(|point| point.is_lone_output());
         let lone = lone.map(|point| point.name.clone()).collect();
         (program, Rehearsal::new(&controller.name, changed, (points, lone), arguments.renew))

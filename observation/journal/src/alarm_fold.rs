@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use understudy_bus::HostEvent;
-use understudy_cluster::{AlarmDeclaration, CommonPoints, same_point};
+use understudy_cluster::{AlarmDeclaration, CommonPoints, Way, same_point};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_typed::Point;
 use understudy_wire::{Image, Member, Part, ProgramHash, ProgramId};
@@ -152,7 +152,8 @@ impl AlarmFold {
             self.found.entry((program, first)).or_insert_with(points);
         }
         let before = before.or(first).and_then(|before| present.controller_of(program, before));
-        let common = before.map(|before| CommonPoints::of(before, version)).unwrap_or_default();
+        let common =
+            before.map(|before| CommonPoints::of(before, version, Way::There)).unwrap_or_default();
         let known = self.found.get(&(program, version.hash));
         let follow = |(place, alarm): (usize, &AlarmDeclaration)| {
             let (common, points) = match alarm.is_output {

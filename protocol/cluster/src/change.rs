@@ -35,7 +35,7 @@ pub use self::settings::ChangedSetting;
 pub use self::unfit::{PairReason, PointList, Unfit};
 use crate::canonical::points_hash;
 use crate::cluster::Cluster;
-use crate::code::Code;
+use crate::code::{Code, Way};
 use crate::configuration::{fallback_text, filled};
 use crate::source_text::read_kept;
 
@@ -232,8 +232,8 @@ impl ChangeTexts {
                 program: changed.program,
                 before: program(&before, &changed.before),
                 after: program(&after, &changed.after),
-                forward: Arc::new(Between::new(&before, &after)),
-                back: Arc::new(Between::new(&after, &before)),
+                forward: Arc::new(Between::new(&before, &after, Way::There)),
+                back: Arc::new(Between::new(&after, &before, Way::Back)),
                 points: None,
                 known_by: [&before, &after].map(|code| points_hash(&code.interface())),
             });
@@ -350,8 +350,8 @@ struct Between {
 }
 
 impl Between {
-    fn new(from: &Code, to: &Code) -> Self {
-        let successor = to.successor(from);
+    fn new(from: &Code, to: &Code, way: Way) -> Self {
+        let successor = to.successor(from, way);
         Self { from: from.clone(), to: to.clone(), successor }
     }
 }

@@ -10,7 +10,7 @@ use understudy_ladder::{Executed, LowerError, Observer, Program as LadderProgram
 use understudy_logic::{Circuit, Register};
 use understudy_typed::{
     CarriedPath, CarriedState, EdgeMemory, Elementary, Fate, Program as TypedProgram, Renamed,
-    Successor, Told, is_within,
+    Successor, Told, is_within, is_within_in_any_case,
 };
 use understudy_wire::ProgramHash;
 
@@ -23,6 +23,15 @@ pub struct Code {
     typed: Arc<TypedProgram>,
     source: Arc<SourceText>,
     body: Body,
+}
+
+/// Which way an online change goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// From the program before to the one after.
+    There,
+    /// From the program after back to the one before: the change is cancelled, or taken back.
+    Back,
 }
 
 /// What a program is written in.
@@ -175,7 +184,7 @@ impl Code {
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64]) -> CarriedState {
         let state = before.typed_state(state);
-        let renamed = self.renamed(before);
+        let renamed = self.renamed(before, Way::There);
         let mut carried =
             self.told(before, |told| self.typed.carried(&before.typed, &state, told, &renamed));
         if let Body::Rungs(rungs) = &self.body {
@@ -205,8 +214,8 @@ impl Code {
     }
 
     /// What becomes of each variable in an online change from the program before it.
-    pub(crate) fn fates(&self, before: &Self) -> Vec<CarriedPath> {
-        let successor = self.successor(before);
+    pub(crate) fn fates(&self, before: &Self, way: Way) -> Vec<CarriedPath> {
+        let successor = self.successor(before, way);
         let executable = before.executable();
         let state = before.typed_state(executable.initial());
         let mut paths = self.told(before, |told| successor.carried(&state, told)).paths;
@@ -233,7 +242,8 @@ impl Code {
     /// lack values.
     pub(crate) fn nearest(&self, before: &Self) -> Option<String> {
         self.layout()?;
-        let narrowed = self.fates(before).into_iter().find(|path| path.fate == Fate::Narrowed);
+        let narrowed =
+            self.fates(before, Way::There).into_iter().find(|path| path.fate == Fate::Narrowed);
         narrowed.map(|path| path.path)
     }
 
@@ -313,15 +323,34 @@ impl Code {
     }
 
     /// The way from the program before it to this one, by the names and types of its variables.
-    pub(crate) fn successor(&self, before: &Self) -> Successor {
-        let (others, renamed) = (self.same_edges(before), self.renamed(before));
+    pub(crate) fn successor(&self, before: &Self, way: Way) -> Successor {
+        let (others, renamed) = (self.same_edges(before), self.renamed(before, way));
         Successor::new(&before.typed, &self.typed, &others, renamed)
     }
 
-    /// Paths that have another name in this program than in the one before it: by the pairs of this one, and by those of the other one the way back.
-    pub(crate) fn renamed(&self, before: &Self) -> Vec<Renamed> {
-        let back = before.source.renamed.iter().map(|(old, new)| (new.clone(), old.clone()));
-        self.source.renamed.iter().cloned().chain(back).collect()
+    /// Paths that have another name in this program than in the one before it.
+    ///
+    /// Each path is in one pair at most. On the way there the pairs of this program count, and then those of the other one the other way, for what these
+    /// leave. The way back is by the same pairs the other way, whatever pairs the older program has from an earlier change.
+    pub(crate) fn renamed(&self, before: &Self, way: Way) -> Vec<Renamed> {
+        let other_way = |(old, new): Renamed| (new, old);
+        if way == Way::Back {
+            return before.renamed(self, Way::There).into_iter().map(other_way).collect();
+        }
+        let (was, is) = (&before.typed, &self.typed);
+        let counts = |(old, new): &&Renamed| {
+            was.has_path(old) && is.has_path(new) && !is.has_path(old) && !was.has_path(new)
+        };
+        let own = &self.source.renamed;
+        let counting: Vec<&Renamed> = own.iter().filter(counts).collect();
+        let overlap = |one: &str, other: &str| {
+            is_within_in_any_case(one, other) || is_within_in_any_case(other, one)
+        };
+        let is_left = |(old, new): &Renamed| {
+            counting.iter().all(|pair| !overlap(&pair.0, old) && !overlap(&pair.1, new))
+        };
+        let others = before.source.renamed.iter().cloned().map(other_way).filter(is_left);
+        own.iter().cloned().chain(others).collect()
     }
 
     /// A state of the program in the order of its variables, for one as stations hold it.

@@ -46,7 +46,7 @@ pub use change::{
     same_point,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Twin, Understudy};
-pub use code::{Code, Unnamed};
+pub use code::{Code, Unnamed, Way};
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
 pub use notify::Notify;

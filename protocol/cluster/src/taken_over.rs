@@ -3,11 +3,11 @@
 use understudy_executable::Scratch;
 use understudy_typed::Origin;
 
-use crate::code::Code;
+use crate::code::{Code, Way};
 
 /// Where the values of a program come from when it takes the place of the one before it, as far as stations hold them.
 pub fn origins(before: &Code, after: &Code) -> Vec<Origin> {
-    let mut origins = after.successor(before).origins();
+    let mut origins = after.successor(before, Way::There).origins();
     origins.retain(|origin| before.holds_address(origin.before));
     origins
 }
@@ -17,7 +17,7 @@ pub fn origins(before: &Code, after: &Code) -> Vec<Origin> {
 /// # Panics
 /// If `state` is shorter than a state of `before`.
 pub fn states_at_change(before: &Code, after: &Code, state: &[u64]) -> [Vec<u64>; 2] {
-    let changed = after.changed(before, state, &after.successor(before));
+    let changed = after.changed(before, state, &after.successor(before, Way::There));
     [before.typed_state(state).into_owned(), after.typed_state(&changed).into_owned()]
 }
 

@@ -11,7 +11,7 @@ use understudy_bits::SameNames;
 use understudy_typed::{Declared, Point, Points, Renamed};
 
 use crate::cluster::Controller;
-use crate::code::Code;
+use crate::code::{Code, Way};
 
 /// The points that two versions of a program have in common.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -24,8 +24,8 @@ pub struct CommonPoints {
 
 impl CommonPoints {
     /// Those of a program and the one that takes its place.
-    pub fn of(before: &Controller, after: &Controller) -> Self {
-        let pairs = after.code.renamed(&before.code);
+    pub fn of(before: &Controller, after: &Controller, way: Way) -> Self {
+        let pairs = after.code.renamed(&before.code, way);
         let [old, new] = [&before.interface, &after.interface];
         Self {
             inputs: common(&old.inputs, &new.inputs, &pairs),
@@ -74,7 +74,9 @@ pub(super) fn named_after<'a>(
 /// The name in a program of an input of the program before it; the same one where it has none of it.
 pub fn input_name_after(before: &Code, after: &Code, name: &str) -> String {
     let (old, new) = (before.interface().inputs, after.interface().inputs);
-    let is = |was| named_after(was, (&old, &new), &after.renamed(before)).map(|is| is.name.clone());
+    let is = |was| {
+        named_after(was, (&old, &new), &after.renamed(before, Way::There)).map(|is| is.name.clone())
+    };
     old.find(name).and_then(is).unwrap_or_else(|| name.to_owned())
 }
 

@@ -11,6 +11,7 @@ use super::points::{are_other_points, fixed_points, points_change};
 use super::settings::{ChangedSetting, changed_settings};
 use super::{ChangedFallback, NeedsStop, Unfit};
 use crate::cluster::Cluster;
+use crate::code::Way;
 
 /// What differs of one program.
 pub(super) struct Difference {
@@ -56,7 +57,7 @@ pub(super) fn differences(
         if with_points.contains(&program) {
             let name = || old.name.clone();
             if !is_replaced {
-                let points = changed_points(before, after, program);
+                let points = changed_points(before, after, program, Way::There);
                 reasons.push(Unfit::Unmarked { program: name(), points: points.into() }.into());
             }
             let fixed = fixed_points(before, after, program);

@@ -9,7 +9,7 @@ use super::ChangeTexts;
 use super::common::CommonPoints;
 use super::settings::{ChangedSetting, changed_settings};
 use crate::cluster::Cluster;
-use crate::code::Code;
+use crate::code::{Code, Way};
 use crate::configuration::fallback_text;
 
 /// The settings of remote I/Os that an online change replaces, in the words of the cluster file, and those of outputs one by one.
@@ -24,7 +24,7 @@ pub fn changed_fallbacks(
         let place = program.index();
         let both = [before.remote_ios().get(place)?, after.remote_ios().get(place)?];
         let common =
-            CommonPoints::of(before.controllers().get(place)?, after.controllers().get(place)?);
+            CommonPoints::of(before.controllers().get(place)?, after.controllers().get(place)?, Way::There);
         let name = &both[0].name;
         let [old, new] = both.map(|it| format!("remote io {name}\n{}", fallback_text(&it.fallback)));
         let is_of_outputs = |setting: &ChangedSetting| {
@@ -66,8 +66,8 @@ fn ramp_value(output: &Point, fallback: &Fallback, period: Duration) -> String {
 }
 
 /// What becomes of each variable of a program in an online change.
-pub fn fates(before: &Code, after: &Code) -> Vec<CarriedPath> {
-    after.fates(before)
+pub fn fates(before: &Code, after: &Code, way: Way) -> Vec<CarriedPath> {
+    after.fates(before, way)
 }
 
 /// The pairs of a program that have done their work: the program before has the new name already.

@@ -10,6 +10,7 @@ use understudy_wire::{ProgramId, Role};
 use super::common::{named_after, stays};
 use super::plan::fail_safe_value;
 use crate::cluster::{Cluster, Controller, RemoteIo};
+use crate::code::Way;
 use crate::place::Place;
 use crate::source::{InputSource, InputSourceKind, OperatorDeclaration};
 
@@ -202,11 +203,16 @@ fn declarations(was: &Point, is: &Point) -> [String; 2] {
 }
 
 /// The points of a program that change: inputs, then outputs. Where a point is in an image is of no interest to people.
-pub fn changed_points(before: &Cluster, after: &Cluster, program: ProgramId) -> Vec<ChangedPoint> {
+pub fn changed_points(
+    before: &Cluster,
+    after: &Cluster,
+    program: ProgramId,
+    way: Way,
+) -> Vec<ChangedPoint> {
     let (Some(old), Some(new)) = (Side::of(before, program), Side::of(after, program)) else {
         return Vec::new();
     };
-    let pairs = new.controller.code.renamed(&old.controller.code);
+    let pairs = new.controller.code.renamed(&old.controller.code, way);
     let mut changed = Vec::new();
     for is_output in [false, true] {
         let points = (old.points(is_output), new.points(is_output));

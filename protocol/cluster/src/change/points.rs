@@ -19,6 +19,7 @@ use super::unfit::different_point;
 use super::{Between, ChangeError, ChangeTexts, Difference, NeedsStop, differences};
 use crate::canonical::points_hash;
 use crate::cluster::{Cluster, Controller, RemoteIo};
+use crate::code::Way;
 use crate::configuration::{FALLBACK, INPUT, input_line};
 use crate::device::Side;
 use crate::read::{Overrides, read_with};
@@ -221,8 +222,8 @@ fn program_change(
         program,
         before: version(old),
         after: version(new),
-        forward: Arc::new(Between::new(&old.code, &new.code)),
-        back: Arc::new(Between::new(&new.code, &old.code)),
+        forward: Arc::new(Between::new(&old.code, &new.code, Way::There)),
+        back: Arc::new(Between::new(&new.code, &old.code, Way::Back)),
         points: points.map(Arc::new),
         known_by: [old, new].map(|it| points_hash(&it.interface)),
     }
@@ -240,7 +241,7 @@ pub(super) fn points_change(
     if old.hash == new.hash || !are_other_points(before, after, program) {
         return None;
     }
-    let common = CommonPoints::of(old, new);
+    let common = CommonPoints::of(old, new, Way::There);
     Some(PointsChange {
         before: Arc::new(before.layout(program)?),
         after: Arc::new(after.layout(program)?),

@@ -6,7 +6,7 @@ use understudy_typed::{Fate, WrongPair};
 
 use super::point_fates::ChangedPoint;
 use super::points::FixedPoints;
-use crate::code::{Code, Unnamed};
+use crate::code::{Code, Unnamed, Way};
 
 /// Why a program cannot be replaced by another one while it runs.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -132,7 +132,7 @@ impl Unfit {
         if pairs.is_empty() {
             return Vec::new();
         }
-        let paths = after.fates(before);
+        let paths = after.fates(before, Way::There);
         let types = |(old, new): &(String, String)| {
             let path = paths.iter().find(|path| {
                 let is_old = path.renamed_from.as_ref().is_some_and(|from| from == old);

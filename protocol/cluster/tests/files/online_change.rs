@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use understudy_cluster::{ChangeTexts, Cluster, Code, NeedsStop, OnlineChanges, fates};
+use understudy_cluster::{ChangeTexts, Cluster, Code, NeedsStop, OnlineChanges, Way, fates};
 use understudy_cycle::{OnlineChange, ProgramChange};
 use understudy_executable::{Executable, Scratch};
 use understudy_ladder::{Coil, CoilKind, Contact, ContactKind, Element, Rung, Signal, print};
@@ -261,7 +261,7 @@ fn a_rung_that_is_added_reads_what_the_old_program_had_computed() {
         let [change] = &change.programs[..] else { continue };
         changes += 1;
         let lost = |path: &CarriedPath| path.fate == Fate::Dropped;
-        let fates = fates(codes[0], codes[1]);
+        let fates = fates(codes[0], codes[1], Way::There);
         assert!(!fates.iter().any(lost), "seed {seed}: {fates:?}\n{before}to\n{after}");
         let registers = |code: &Code| code.circuit().map_or(0, |of| of.registers().len());
         newly_read += u32::from(registers(codes[1]) > registers(codes[0]));

@@ -1,7 +1,7 @@
 //! Online changes in which points differ: which points stay, and why some programs cannot have others while they run.
 
 use understudy_cluster::{
-    ChangeTexts, ChangedPoint, Cluster, FixedPoints, NeedsStop, PointFate, Unfit,
+    ChangeTexts, ChangedPoint, Cluster, FixedPoints, NeedsStop, PointFate, Unfit, Way,
     change_with_points, changed_fallbacks, changed_points, later_settings,
 };
 use understudy_cycle::{Moved, PointPlace};
@@ -187,13 +187,13 @@ fn points_that_change_are_listed_for_people() {
         point("done", true, PointFate::Removed("BOOL".to_owned(), some("`TRUE`"))),
         point("more", true, PointFate::New("BOOL".to_owned(), some("`TRUE`"))),
     ];
-    assert_eq!(changed_points(&before, &after, ProgramId(0)), expected);
-    assert_eq!(changed_points(&before, &before, ProgramId(0)), []);
+    assert_eq!(changed_points(&before, &after, ProgramId(0), Way::There), expected);
+    assert_eq!(changed_points(&before, &before, ProgramId(0), Way::There), []);
     // Where a point is in an image is no news, and settings of points that stay are listed with the others.
     let moved = cluster(&other(), "hold_cycles = 9\nfail_safe = { done = true }", "");
     let plain = cluster(LEFT, "", "");
     let more = point("more", true, PointFate::New("BOOL".to_owned(), some("`FALSE`")));
-    assert_eq!(changed_points(&plain, &moved, ProgramId(0)), [more]);
+    assert_eq!(changed_points(&plain, &moved, ProgramId(0), Way::There), [more]);
     let texts = ChangeTexts::between(&plain, &moved).expect("an online change");
     let settings = changed_fallbacks(&plain, &moved, &texts);
     let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
@@ -380,7 +380,7 @@ fn points_with_other_names_stay_by_the_declared_pairs() {
         let points = points.expect("they have other names");
         // Each input and each output, and those of its program fault.
         assert_eq!((points.inputs.len(), points.outputs.len()), (3, 3), "{pairs}");
-        let told = changed_points(&before, &after, ProgramId(0));
+        let told = changed_points(&before, &after, ProgramId(0), Way::There);
         let told: Vec<String> = told.iter().map(|it| format!("{} {it}", it.fate.word())).collect();
         let expected = [
             format!("renamed input {level}  from level"),

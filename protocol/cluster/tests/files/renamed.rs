@@ -1,7 +1,7 @@
 //! Variables that have another name in the new program: their values go on by the pairs of the new cluster file.
 
 use understudy_cluster::{
-    ChangeTexts, Cluster, NeedsStop, PairReason, Unfit, done_pairs, fates, read_kept,
+    ChangeTexts, Cluster, NeedsStop, PairReason, Unfit, Way, done_pairs, fates, read_kept,
 };
 use understudy_cycle::OnlineChange;
 use understudy_executable::{Executable, Scratch};
@@ -51,7 +51,7 @@ fn values_go_on_under_their_new_names_and_back() {
     let pairs = "renamed = { count = \"sum\", \"p.hours\" = \"p.total\" }";
     let new = cluster("one.st", &text, pairs);
     let [before, after] = [&old, &new].map(|cluster| &cluster.controllers()[0].code);
-    let paths = fates(before, after);
+    let paths = fates(before, after, Way::There);
     let of = |name: &str| paths.iter().find(|path| path.path == name).expect("it is listed");
     assert_eq!(
         (of("sum").fate, of("sum").renamed_from.as_deref()),
@@ -184,7 +184,7 @@ fn a_pair_that_has_done_its_work_does_nothing() {
     for (after, done) in [(&next, 1), (&plain, 0)] {
         let [one, other] = [&renamed, after].map(|cluster| &cluster.controllers()[0].code);
         assert_eq!(done_pairs(one, other).len(), done);
-        let paths = fates(one, other);
+        let paths = fates(one, other, Way::There);
         let of = |name: &str| paths.iter().find(|path| path.path == name).expect("it is listed");
         assert_eq!((of("sum").fate, of("count").fate), (Fate::Kept, Fate::New), "{paths:?}");
         assert!(paths.iter().all(|path| path.renamed_from.is_none()), "{paths:?}");
@@ -206,6 +206,47 @@ fn a_pair_that_has_done_its_work_does_nothing() {
     assert_eq!(step(&again.programs[0].after.executable, &mut state, 0), 302);
 }
 
+/// A name that an earlier change replaced is given to a new variable, while the next change replaces the name that came after it. The pair of the earlier
+/// file does not count for the variable that the new one pairs, on the way there and on the way back.
+#[test]
+fn a_pair_of_an_earlier_change_takes_no_value_of_a_later_one() {
+    let earlier = "renamed = { count = \"total\" }";
+    let before =
+        cluster("one.st", &program("hours : DINT;", "total : DINT;", "total", "p.hours"), earlier);
+    let variables = "count : DINT := 5000000; total2 : DINT;";
+    let text = program("hours : DINT;", variables, "total2", "p.hours");
+    let text = text.replace("y := total2", "y := count + total2");
+    let after = cluster("one.st", &text, "renamed = { total = \"total2\" }");
+    let [one, other] = [&before, &after].map(|cluster| &cluster.controllers()[0].code);
+    let told = |from, to, way| {
+        let mut paths: Vec<(String, Fate, Option<String>)> = fates(from, to, way)
+            .into_iter()
+            .filter(|path| path.fate != Fate::Kept || path.renamed_from.is_some())
+            .map(|path| (path.path, path.fate, path.renamed_from))
+            .collect();
+        paths.sort_by(|one, other| one.0.cmp(&other.0));
+        paths
+    };
+    let named =
+        |name: &str, fate, from: Option<&str>| (name.to_owned(), fate, from.map(str::to_owned));
+    assert_eq!(
+        told(one, other, Way::There),
+        [named("count", Fate::New, None), named("total2", Fate::Kept, Some("total"))]
+    );
+    assert_eq!(
+        told(other, one, Way::Back),
+        [named("count", Fate::Dropped, None), named("total", Fate::Kept, Some("total2"))]
+    );
+    let change = change(&before, &after).expect("it needs no stop");
+    let [change] = &change.programs[..] else { panic!("one program") };
+    let mut state = change.before.executable.initial().to_vec();
+    assert_eq!([0; 2].map(|_| step(&change.before.executable, &mut state, 0)), [101, 202]);
+    let mut state = change.forward.convert(&state);
+    assert_eq!(step(&change.after.executable, &mut state, 0), 5_000_000 + 303);
+    let mut state = change.back.convert(&state);
+    assert_eq!(step(&change.before.executable, &mut state, 0), 404);
+}
+
 /// What sees the edges of a signal goes with it: a signal that is TRUE already is no new edge.
 #[test]
 fn signals_of_rungs_keep_their_values_and_their_edges() {
@@ -216,7 +257,7 @@ fn signals_of_rungs_keep_their_values_and_their_edges() {
     };
     let old = cluster("one.ladder", &rungs("m"), "");
     let new = cluster("one.ladder", &rungs("motor"), "renamed = { m = \"motor\" }");
-    let paths = fates(&old.controllers()[0].code, &new.controllers()[0].code);
+    let paths = fates(&old.controllers()[0].code, &new.controllers()[0].code, Way::There);
     assert!(paths.iter().all(|path| path.fate == Fate::Kept), "{paths:?}");
     let change = change(&old, &new).expect("it needs no stop");
     let [change] = &change.programs[..] else { panic!("one program") };
