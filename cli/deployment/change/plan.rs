@@ -77,7 +77,11 @@ impl Plan {
 
     fn drops(&self) -> bool {
         let is_lost = |fate| matches!(fate, Fate::Dropped | Fate::Narrowed);
-        self.programs.iter().any(|program| program.paths.iter().any(|path| is_lost(path.fate)))
+        let is_unkept = |point: &ChangedPoint| matches!(point.fate, PointFate::Unkept(_));
+        self.programs.iter().any(|program| {
+            program.paths.iter().any(|path| is_lost(path.fate))
+                || program.points.iter().any(is_unkept)
+        })
     }
 
     /// Refuses a change that drops values, unless the engineer says that it may; `what` says which values, and what becomes of them.
@@ -127,10 +131,13 @@ impl Plan {
             for point in points {
                 let _ = writeln!(text, "  {:<9}  {point}", point.fate.word());
             }
+            if !points.is_empty() {
+                let _ = writeln!(text, "  all forces of {name} end with the switch");
+            }
             for alarm in ended_alarms {
                 let _ = writeln!(
                     text,
-                    "  alarm {alarm}: its point is gone with the switch, so it is over, and does not come again"
+                    "  alarm {alarm}: its point is gone with the switch, so it is over until a change brings the point back"
                 );
             }
             for (before, now) in done {
@@ -239,7 +246,8 @@ fn point_json(ChangedPoint { name, is_output, fate }: &ChangedPoint) -> Value {
         PointFate::Retyped([before, now], value) => [Some(before), Some(now), value],
         PointFate::Redeclared([before, now])
         | PointFate::Moved([before, now])
-        | PointFate::Sourced([before, now]) => [Some(before), Some(now), None],
+        | PointFate::Sourced([before, now])
+        | PointFate::Unkept([before, now]) => [Some(before), Some(now), None],
     };
     json!({
         "point": name,

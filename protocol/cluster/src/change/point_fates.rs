@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use understudy_cycle::OperatorInputKind;
+use understudy_cycle::{OperatorInput, OperatorInputKind};
 use understudy_executable::declared;
 use understudy_typed::{Declared, Point, Points};
 use understudy_wire::{ProgramId, Role};
@@ -31,6 +31,9 @@ pub enum PointFate {
     Moved([String; 2]),
     /// An input that comes from elsewhere, or has other limits.
     Sourced([String; 2]),
+    /// What an operator has written is lost, or some of the values that he may have written are: the values that continue, and the one that counts in
+    /// the place of any other one.
+    Unkept([String; 2]),
 }
 
 /// A point that an online change adds, removes or changes.
@@ -55,6 +58,7 @@ impl PointFate {
             Self::Redeclared(_) => "redeclared",
             Self::Moved(_) => "moved",
             Self::Sourced(_) => "sourced",
+            Self::Unkept(_) => "narrowed",
         }
     }
 }
@@ -90,6 +94,12 @@ impl fmt::Display for ChangedPoint {
                 write!(formatter, "{before} to {now}")
             }
             PointFate::Sourced([before, now]) => write!(formatter, "from: {before}; now: {now}"),
+            PointFate::Unkept([kept, now]) => {
+                write!(
+                    formatter,
+                    "{kept} is kept of what was written, and anything else becomes {now}"
+                )
+            }
         }
     }
 }
@@ -130,6 +140,12 @@ impl<'a> Side<'a> {
         let mut sources = self.remote_io.inputs.iter();
         let source = sources.find(|source| source.name == point.name);
         source.map_or("the field".to_owned(), |source| self.source_text(source, &point.declared()))
+    }
+
+    /// What operators write to an input.
+    fn operator_input(&self, point: &Point) -> Option<&OperatorInput> {
+        let source = self.remote_io.inputs.iter().find(|source| source.name == point.name)?;
+        Some(&source.operator()?.input)
     }
 
     fn source_text(&self, source: &InputSource, declared: &Declared) -> String {
@@ -202,6 +218,37 @@ fn declarations(was: &Point, is: &Point) -> [String; 2] {
     })
 }
 
+/// What of a written value of an input is lost; nothing where every value continues.
+fn unkept(
+    was: &Point,
+    written: &OperatorInput,
+    (is, now): (&Point, Option<&OperatorInput>),
+) -> Option<PointFate> {
+    let lasts = |input: &OperatorInput| {
+        matches!(input.kind, OperatorInputKind::Level | OperatorInputKind::Setpoint { .. })
+    };
+    let declared = is.declared();
+    // What comes from elsewhere now has another value anyhow.
+    let now = now.filter(|_| lasts(written))?;
+    let initial = declared.text(now.initial);
+    let nothing = || Some(PointFate::Unkept(["nothing".to_owned(), initial.clone()]));
+    if !stays(was, is) || !now.is_of_kind(written) {
+        return nothing();
+    }
+    let (
+        OperatorInputKind::Setpoint { low, high },
+        OperatorInputKind::Setpoint { low: least, high: most },
+    ) = (written.kind, now.kind)
+    else {
+        return None;
+    };
+    if now.admits(low) && now.admits(high) {
+        return None;
+    }
+    let [least, most] = [least, most].map(|limit| declared.text(limit));
+    Some(PointFate::Unkept([format!("a value from {least} to {most}"), initial]))
+}
+
 /// The points of a program that change: inputs, then outputs. Where a point is in an image is of no interest to people.
 pub fn changed_points(
     before: &Cluster,
@@ -244,6 +291,12 @@ pub fn changed_points(
             let sources = [old.source(was), new.source(is)];
             if !is_output && sources[0] != sources[1] {
                 note(name, PointFate::Sourced(sources));
+            }
+            if !is_output
+                && let Some(written) = old.operator_input(was)
+                && let Some(unkept) = unkept(was, written, (is, new.operator_input(is)))
+            {
+                note(name, unkept);
             }
         }
         for is in declared(points.1).filter(|is| !found.contains(&is.name.as_str())) {

@@ -182,6 +182,7 @@ fn points_that_change_are_listed_for_people() {
                 "setpoint from 0 to 5, initial 0",
             )),
         ),
+        point("level", false, PointFate::Unkept(two("a value from 0 to 5", "0"))),
         point("extra", false, PointFate::New("REAL".to_owned(), None)),
         point("shown", true, PointFate::Retyped(two("INT", "DINT"), some("`8`"))),
         point("done", true, PointFate::Removed("BOOL".to_owned(), some("`TRUE`"))),
@@ -526,5 +527,46 @@ fn what_counts_with_the_next_start_is_told() {
         ),
     ] {
         assert_eq!(refused(&plain, &with(head, &input(""), "")), [told]);
+    }
+}
+
+/// Limits that have every value of the old ones lose nothing. Narrower ones, another kind and another type do, and so does the way back from wider ones.
+#[test]
+fn what_an_operator_has_written_is_kept_or_listed() {
+    let with = |input: &str, of: &str, body: &str| {
+        let text =
+            LEFT.replace("level : INT;", &format!("level : {of};")).replace("done := go;", body);
+        cluster(&text, &format!("inputs = {{ level = {{ {input} }} }}"), "")
+    };
+    let wide = "operator = \"setpoint\", low = 0, high = 9, initial = 3";
+    let unkept = |before: &Cluster, after: &Cluster, way| {
+        let all = changed_points(before, after, ProgramId(0), way);
+        let unkept = all.into_iter().filter_map(|point| match point.fate {
+            PointFate::Unkept([kept, now]) => Some(format!("{} {kept}: {now}", point.name)),
+            _ => None,
+        });
+        unkept.collect::<Vec<_>>()
+    };
+    let before = with(wide, "INT", "done := go;");
+    let other = |input: &str, of: &str| with(input, of, "done := NOT go;");
+    for (input, of, there, back) in [
+        (wide, "INT", vec![], vec![]),
+        (
+            "operator = \"setpoint\", low = -1, high = 20, initial = 4",
+            "INT",
+            vec![],
+            vec!["level a value from 0 to 9: 3"],
+        ),
+        (
+            "operator = \"setpoint\", low = 2, high = 9, initial = 4",
+            "INT",
+            vec!["level a value from 2 to 9: 4"],
+            vec![],
+        ),
+        (wide, "DINT", vec!["level nothing: 3"], vec!["level nothing: 3"]),
+    ] {
+        let after = other(input, of);
+        assert_eq!(unkept(&before, &after, Way::There), there, "{input}");
+        assert_eq!(unkept(&after, &before, Way::Back), back, "{input}");
     }
 }

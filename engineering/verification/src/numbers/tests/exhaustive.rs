@@ -86,7 +86,7 @@ impl<'a> Reference<'a> {
         reference
     }
 
-    fn step(&self, state: &mut Vec<u64>, a: u64, n: u64) -> Values {
+    fn step(&self, state: &mut [u64], a: u64, n: u64) -> Values {
         let mut image = vec![0; self.machine.input_count().div_ceil(64)];
         let mut outputs = vec![0; self.machine.output_count().div_ceil(64)];
         let set = |image: &mut Vec<u64>, name: &str, value| {
