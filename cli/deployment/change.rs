@@ -14,8 +14,8 @@ use serde_json::{Value, json};
 use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides, Way};
 use understudy_journal::kept_overrides;
 use understudy_text::duration::parse_positive;
-use understudy_view::{Run, ViewError};
-use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal};
+use understudy_view::{Model, Run, ViewError};
+use understudy_wire::{ChangeRequest, ConfigurationHash, Member, OrderRefusal, ProgramId};
 
 use self::difference::{Differences, newest_states};
 use self::members::{Members, gives};
@@ -91,6 +91,13 @@ enum Step {
     Cancel,
 }
 
+impl Step {
+    /// Whether members are asked for it, which say themselves what they run.
+    fn asks_members(self) -> bool {
+        !matches!(self, Self::Plan | Self::Rehearse)
+    }
+}
+
 const NO_PROGRAM: &str = "no program changes: the settings of the new file count from `accept` on";
 
 /// Time limit for members that still need the other configuration: histories must leave the change behind.
@@ -113,8 +120,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let (after, used) = files::cluster(&arguments.after, said)?;
     let texts = ChangeTexts::between(&before, &after).map_err(|reasons| needs_stop(&reasons))?;
     let plan = Plan::of(&before, &after, &texts, Way::There);
+    let live = run.as_ref().and_then(newest_states);
+    if let Some(live) = live.as_ref().filter(|_| !arguments.step.asks_members()) {
+        check_running(live, [&before, &after])?;
+    }
     if arguments.step == Step::Plan {
-        let live = run.as_ref().and_then(newest_states);
         let budget = arguments.budget;
         let differences = Differences::of((&before, &after), &texts, live.as_ref(), budget);
         return Ok(plan.answer(&differences).with_used(used));
@@ -180,6 +190,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             Ok(finish.ask(&members, &texts, asked).answer(finish.done, plan.json()))
         }
     }
+}
+
+/// A run keeps the cluster file with which it began: what differs from that is no plan for members that run the programs of another one.
+fn check_running(live: &Model, files: [&Cluster; 2]) -> Result<(), Answer> {
+    for (program, old) in (0..).map(ProgramId).zip(files[0].controllers()) {
+        let runs = live.controller_at(program, None).map(|controller| controller.hash);
+        let of_files = files.map(|file| file.controllers().get(program.index()).map(|it| it.hash));
+        if runs.is_some() && !of_files.contains(&runs) {
+            let message = format!(
+                "`{}` runs the program of an earlier change, which is in neither file: give the cluster file that the members run in the place of the run",
+                old.name
+            );
+            return Err(Answer::failed(Status::BadInput, "U0631", message));
+        }
+    }
+    Ok(())
 }
 
 /// Asks the remote I/Os of the programs for the new ones, or for the old ones.

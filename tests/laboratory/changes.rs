@@ -252,6 +252,11 @@ fn a_renamed_variable_keeps_its_value() {
     let counts = ended_well(child, &runs, &run);
     let steps = steps(&counts);
     assert_eq!(steps, [1, 10, 100], "{steps:?}");
+    // The run keeps the file with which it began, and a plan from there would be one for members that do not exist.
+    for step in [&[][..], &["rehearse"]] {
+        let (exit, document, _) = answer(&[&["change", run_text, &after], step].concat());
+        assert_eq!((exit, &document["failures"][0]["code"]), (2, &"U0631".into()), "{document:#}");
+    }
     // What was driven last is explained by the program of the second change.
     let (exit, document, errors) = answer(&["why", "counter.shown", run_text]);
     assert_eq!(exit, 0, "{document:#} {errors}");

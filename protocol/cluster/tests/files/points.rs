@@ -412,7 +412,7 @@ fn other_places_of_the_same_program_need_a_stop() {
     for (after, told) in [
         (
             with(&limits(5), &scaled("1.0")),
-            "sourced input level  from: setpoint from 0 to 9, initial 0; now: setpoint from 0 to 5, initial 0",
+            "sourced input level  from: setpoint from 0 to 9, initial 0; now: setpoint from 0 to 5, initial 0; narrowed input level  a value from 0 to 5 is kept of what was written, and anything else becomes 0",
         ),
         (
             with(&limits(9), &scaled("0.1")),
