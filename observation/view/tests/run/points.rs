@@ -258,6 +258,8 @@ fn every_line_of_the_journal_has_the_names_of_its_time() {
     // A force ends with the points, in the names of before.
     let unforced = of("unforced");
     assert!(unforced[0].contains("step") && unforced[1].contains("more"), "{unforced:?}");
+    let because = "an online change has replaced the inputs and outputs";
+    assert!(unforced.iter().all(|text| text.ends_with(because)), "{unforced:?}");
     let written = of("written");
     assert!(
         written[0].contains("2 to input step") && written[1].contains("7 to input more"),
