@@ -460,6 +460,13 @@ fn a_remote_io_that_starts_again_is_shown_by_its_own_points() {
             let program = &snapshot.programs[0];
             assert_eq!(of_program(&program.values), *values, "{crash}: {cycle}");
         }
+        // It has loaded the change, and says which points it begins with before it is in a cycle.
+        let told: Vec<i64> = model
+            .events()
+            .filter(|event| event.event == "points-changed")
+            .map(|event| event.cycle)
+            .collect();
+        assert!(told.iter().all(|cycle| *cycle >= crash.min(60) as i64), "{crash}: {told:?}");
         assert!(model.alarms().all(|alarm| alarm.alarm != "wrong"));
     }
 }
