@@ -13,7 +13,9 @@ use understudy_wire::{
     WriteRefusal,
 };
 
-pub use self::reason::{AskReason, Lacking, LackingReason, Missing, OldInputs, PartnerLack};
+pub use self::reason::{
+    AskReason, ForceEnd, Lacking, LackingReason, Missing, OldInputs, PartnerLack,
+};
 
 /// Event of a remote I/O.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -254,8 +256,9 @@ pub enum Event {
         moment: Moment,
         /// Signal that was forced.
         signal: SignalPlace,
-        /// Whether its time was over; otherwise the operator has removed it.
-        expired: bool,
+        /// What has ended it.
+        #[serde(alias = "expired", deserialize_with = "reason::read_force_end")]
+        by: ForceEnd,
     },
     /// An operator has written a value, which becomes part of the next sample.
     Written {

@@ -17,7 +17,9 @@ mod trust;
 mod votes;
 
 pub use diagnosis::Diagnosis;
-pub use event::{AskReason, Event, Lacking, LackingReason, Missing, OldInputs, PartnerLack};
+pub use event::{
+    AskReason, Event, ForceEnd, Lacking, LackingReason, Missing, OldInputs, PartnerLack,
+};
 pub use foresight::Foreseen;
 pub use paired_inputs::PairedInput;
 pub use remote_io::RemoteIo;

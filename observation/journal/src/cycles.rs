@@ -57,11 +57,12 @@ impl Cycles {
         self.counted(number)
     }
 
-    /// The cycle of a moment; the newest one where its epoch has not been seen.
+    /// The cycle of a moment; the newest one where its epoch has not been seen, and where the member that reports it was in no cycle yet.
     pub fn of(&self, moment: Option<Moment>) -> i64 {
         if let Some((fixed, _)) = self.fixed {
             return fixed;
         }
+        let moment = moment.filter(|moment| *moment != Moment::default());
         let number =
             moment.and_then(|moment| self.numbering.of(moment)).or_else(|| self.numbering.latest());
         self.counted(number.unwrap_or(0))

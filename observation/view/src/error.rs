@@ -42,6 +42,14 @@ pub enum ViewError {
         /// The nearest name, or all.
         hint: String,
     },
+    /// The name is that of a block, a structure or an array.
+    #[error("U0573: `{name}` has no value of its own; name a part of it, such as {}", parts.iter().map(|part| format!("`{part}`")).collect::<Vec<_>>().join(", "))]
+    NoValue {
+        /// As it was asked for.
+        name: String,
+        /// Parts that have one, the first few.
+        parts: Vec<String>,
+    },
     /// Several programs have an output of this name.
     #[error("U0574: {} have an output `{name}`; name the program too, for example `{}.{name}`", programs.join(" and "), programs.first().map_or("robot", String::as_str))]
     SeveralOutputs {
@@ -112,7 +120,7 @@ impl ViewError {
             Self::Kept(KeptError::NotKept { .. }) => "U0571",
             Self::Kept(_) | Self::Journal { .. } => "U0572",
             Self::Version { .. } => "U0534",
-            Self::NoOutput { .. } => "U0573",
+            Self::NoOutput { .. } | Self::NoValue { .. } => "U0573",
             Self::SeveralOutputs { .. } => "U0574",
             Self::NoCycle { .. } => "U0575",
             Self::NoState { .. } => "U0576",

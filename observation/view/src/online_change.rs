@@ -206,8 +206,11 @@ impl Model {
         let is_it = |name: &ChangeName| two.iter().all(|it| name.has(*it));
         let loaded = loaded.filter(|loaded| is_it(&loaded.name));
         let named = loaded.map(|loaded| loaded.name).or(known.named.filter(is_it));
-        // Who began to read within the change does not know which one was before: as long as it is not accepted, that is the members' own.
-        let [before, after] = named.map_or(two, |name| [name.before, name.after]);
+        // Who began to read within the change does not know which one was before: that of the cluster file, or the members' own until it is accepted.
+        let [own, prepared] = two;
+        let first = self.cluster().agreement().configuration;
+        let read = if prepared == first { [prepared, own] } else { two };
+        let [before, after] = named.map_or(read, |name| [name.before, name.after]);
         let place = |member| match of(member) {
             None => ChangePlace::NotLoaded,
             Some(None) => ChangePlace::NotKnown,

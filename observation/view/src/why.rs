@@ -27,6 +27,9 @@ use crate::model::Model;
 use crate::value::{self, forced_point, forced_value, has_numbers, named_text, value_in};
 use explain::Explainer;
 
+/// Parts of a block, a structure or an array that an error lists.
+const PARTS: usize = 6;
+
 /// Why an output or a variable of a program has its value.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Why {
@@ -371,6 +374,7 @@ impl Model {
         let controllers: Vec<&Controller> = controllers.collect();
         let mut found = Vec::new();
         let mut known = Vec::new();
+        let mut parts = Vec::new();
         for (place, controller) in controllers.iter().enumerate() {
             let program = ProgramId(place as u8);
             let prefix = format!("{}.", controller.name);
@@ -378,7 +382,12 @@ impl Model {
             let is_named = name != asked;
             let typed = controller.code.typed();
             known.extend(typed.variables.iter().map(|it| it.name.clone()));
-            let part = typed.part(name).filter(|it| it.of.elementary().is_some());
+            let (part, whole) = match typed.part(name) {
+                Some(part) if part.of.elementary().is_none() => (None, Some(part)),
+                part => (part, None),
+            };
+            let leaves = whole.map(|whole| typed.leaves(whole, PARTS)).unwrap_or_default();
+            parts.extend(leaves.into_iter().map(|leaf| leaf.name));
             let point = typed.outputs.find(name).map(|point| point.name.clone());
             let name = point.or(part.map(|part| part.name));
             found.extend(name.map(|name| (program, name, is_named)));
@@ -394,6 +403,10 @@ impl Model {
             found.retain(is_computed);
         }
         match found.as_slice() {
+            [] if !parts.is_empty() => {
+                parts.truncate(PARTS);
+                Err(ViewError::NoValue { name: asked.to_owned(), parts })
+            }
             [] => Err(ViewError::NoOutput {
                 name: asked.to_owned(),
                 hint: suggestion(asked, known.iter().map(String::as_str)),

@@ -252,7 +252,7 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         }
     }
 
-    /// As [`Endpoint::restore_change`].
+    /// As [`Endpoint::restore_change`]; reports with what it starts.
     ///
     /// # Errors
     /// As there.
@@ -261,7 +261,9 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         change: Arc<OnlineChange>,
         configurations: Configurations,
     ) -> Result<(), OrderRefusal> {
-        self.endpoint.restore_change(change, configurations)
+        self.endpoint.restore_change(change, configurations)?;
+        self.report(Event::from(Notice::Configured(configurations)));
+        Ok(())
     }
 
     /// As [`Endpoint::admits`].

@@ -169,7 +169,7 @@ pub enum WriteRefusal {
         "another write of this input is not over, or too many writes of this person are: repeat the write"
     )]
     Busy,
-    /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.
+    /// The program does not run: its state is not known yet, is lost, or its sensors are unknown, or a fault has stopped it and the write is a pulse.
     #[error("the program does not run")]
     NotRunning,
     /// The value ended, or another one replaced it, before outputs of a sample with it were applied.

@@ -1,6 +1,6 @@
 //! Why outputs are not proved, and why a program waits.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use understudy_wire::{Moment, StationId};
 
 /// A station that cannot prove the output of a program, from the view of its remote I/O.
@@ -45,6 +45,35 @@ pub enum PartnerLack {
     Modules,
     /// It receives no station that has the program, and the author does.
     Stations,
+}
+
+/// What has ended a force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ForceEnd {
+    /// Its time.
+    Time,
+    /// The operator has ended it, or has forced another signal that has a bit of this one.
+    Operator,
+    /// An online change has replaced the points that its signal was one of.
+    OnlineChange,
+    /// The other remote I/O of the program drives.
+    Handover,
+}
+
+/// Journals before had `expired` in its place: whether it was its time, or else the operator.
+pub(super) fn read_force_end<'de, D: Deserializer<'de>>(from: D) -> Result<ForceEnd, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Read {
+        Expired(bool),
+        By(ForceEnd),
+    }
+    Ok(match Read::deserialize(from)? {
+        Read::Expired(true) => ForceEnd::Time,
+        Read::Expired(false) => ForceEnd::Operator,
+        Read::By(by) => by,
+    })
 }
 
 /// What retained operator inputs have after a start from a state of which there is no note.

@@ -108,6 +108,9 @@ impl RemoteIo {
             self.replacing.runs();
             return selection;
         }
+        let moment = self.moment();
+        let void = self.inputs.writing.not_executed(&self.layout.operator_inputs, moment);
+        self.report_void(&void);
         self.take_back();
         Selection::Missing(Missing::ProgramFault)
     }

@@ -9,7 +9,7 @@ use understudy_wire::{
 };
 
 use super::RemoteIo;
-use crate::event::Event;
+use crate::event::{Event, ForceEnd};
 
 /// Forces in effect, by signal.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
@@ -121,7 +121,7 @@ impl RemoteIo {
         }
         // The operator sees one force for each bit.
         while let Some(signal) = self.inputs.forcing.remove_overlapping(force) {
-            self.report_unforced(signal, false);
+            self.report_unforced(signal, ForceEnd::Operator);
         }
         let until = now + Duration::from_secs(u64::from(force.seconds));
         self.inputs.forcing.put(force.signal, force.value, until);
@@ -133,7 +133,7 @@ impl RemoteIo {
     pub(super) fn unforce(&mut self, &Unforce { signal, points }: &Unforce) {
         let refusal = match self.counts_by(points) {
             true if self.inputs.forcing.remove(signal) => {
-                self.report_unforced(signal, false);
+                self.report_unforced(signal, ForceEnd::Operator);
                 return self.obeyed(Ok(()));
             }
             true => OrderRefusal::NotForced,
@@ -145,19 +145,19 @@ impl RemoteIo {
 
     pub(super) fn end_forces(&mut self, now: Time) {
         while let Some(signal) = self.inputs.forcing.take_expired(now) {
-            self.report_unforced(signal, true);
+            self.report_unforced(signal, ForceEnd::Time);
         }
     }
 
-    /// Ends all forces: a force ends with the remote I/O that was given it.
-    pub(super) fn end_all_forces(&mut self) {
+    /// Ends all forces, which are of this remote I/O and of the points that count.
+    pub(super) fn end_all_forces(&mut self, by: ForceEnd) {
         for active in std::mem::take(&mut self.inputs.forcing).active {
-            self.report_unforced(active.signal, false);
+            self.report_unforced(active.signal, by);
         }
     }
 
-    fn report_unforced(&mut self, signal: SignalPlace, expired: bool) {
-        self.report(Event::Unforced { moment: self.moment(), signal, expired });
+    fn report_unforced(&mut self, signal: SignalPlace, by: ForceEnd) {
+        self.report(Event::Unforced { moment: self.moment(), signal, by });
     }
 }
 

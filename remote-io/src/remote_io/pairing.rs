@@ -36,7 +36,7 @@ use super::actuation::Actuation;
 use super::protection::Protection;
 use super::writing::Writing;
 use crate::diagnosis::Diagnosing;
-use crate::event::{Event, PartnerLack};
+use crate::event::{Event, ForceEnd, PartnerLack};
 use crate::settings::{PairSettings, Settings};
 
 /// Frames to the other one whose answer counts: those of a few deadlines.
@@ -360,7 +360,7 @@ impl RemoteIo {
         let void = self.inputs.writing.lose(&self.layout.operator_inputs, moment, |_| true);
         self.report_void(&void);
         self.inputs.writing = Writing::new(&self.layout.operator_inputs);
-        self.end_all_forces();
+        self.end_all_forces(ForceEnd::Handover);
         self.actuation = Actuation::default();
         self.differed.clear();
         self.give_up_field();

@@ -17,7 +17,7 @@ use understudy_wire::{Header, Holding, Image, PointsHash, ProgramHash, Recalled}
 
 use super::RemoteIo;
 use super::actuation::Execution;
-use crate::event::Event;
+use crate::event::{Event, ForceEnd};
 
 /// The layout by which the device is read, with the version of the program that it is of.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -173,7 +173,7 @@ impl RemoteIo {
             return false;
         };
         let moment = self.moment();
-        self.end_all_forces();
+        self.end_all_forces(ForceEnd::OnlineChange);
         let old = std::mem::replace(&mut self.layout, Arc::clone(passage.to()));
         // By changes of the program alone, the device may be of an earlier version with the same points.
         if self.inputs.sensed.layout == old {

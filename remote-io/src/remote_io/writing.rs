@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   request ──► checked ──► part of the next sample ──► an output with it is applied ──► in effect
-//!                  │                   └── its samples become void, and it is over ──► no effect
+//!                  │                   └── its samples become void, or no program executes them, and it is over ──► no effect
 //!                  ├── the next sample has a forced value ──► no effect
 //!                  └── refused, also while the input is forced
 //! ```
@@ -11,6 +11,7 @@
 //! a write that is repeated under its identifier is answered, and not taken again.
 
 mod laid_out;
+mod lost;
 mod sessions;
 
 use std::time::Duration;
@@ -24,7 +25,7 @@ use understudy_wire::{
 
 use self::sessions::{Progress, Session, Sessions};
 use super::RemoteIo;
-use super::actuation::Applied;
+use super::actuation::{Applied, Execution};
 use crate::event::Event;
 use crate::history::History;
 use understudy_cycle::{OperatorInput, OperatorInputKind, ValueMismatch};
@@ -206,37 +207,6 @@ impl Writing {
         sampled.collect()
     }
 
-    /// The samples of `lost` writes are no longer part of the history: values that hold are sampled again. Answers with the writes that have no
-    /// effect.
-    pub(super) fn lose(
-        &mut self,
-        inputs: &[OperatorInput],
-        moment: Moment,
-        lost: impl Fn(WriteId) -> bool,
-    ) -> WithoutEffect {
-        let mut void = WithoutEffect::new();
-        for session in self.sessions.iter_mut() {
-            if !matches!(session.progress, Progress::Sampled { .. }) || !lost(session.id) {
-                continue;
-            }
-            session.progress = Progress::Taken;
-            let Some(at) = session.input else {
-                if session.is_orphaned {
-                    void.push((session.id, WriteRefusal::Void));
-                }
-                continue;
-            };
-            let written = &mut self.values[at];
-            if written.by == session.id && !written.is_over(&inputs[at]) {
-                written.is_sampled = false;
-            } else {
-                void.push((session.id, WriteRefusal::Void));
-            }
-        }
-        self.sessions.drop_void(&void, moment);
-        void
-    }
-
     /// The newest sample of `history`, of `moment`, has the values, except those of `forced` inputs and of pulses that wait. Pulses advance, and
     /// end where they are forced. Answers with the writes that have no effect.
     pub(super) fn sampled(
@@ -256,6 +226,10 @@ impl Writing {
             match session.input.and_then(|at| forced_out(&inputs[at], forced)) {
                 Some(refusal) => void.push((session.id, refusal)),
                 None if waits => {}
+                // It was in samples that were not executed, and another write has followed.
+                None if session.input.is_some_and(|at| self.values[at].by != session.id) => {
+                    void.push((session.id, WriteRefusal::Void));
+                }
                 None => session.progress = now,
             }
         }
@@ -435,11 +409,15 @@ impl RemoteIo {
             && self.arbiter.question.is_none()
             && !self.actuation.applied.as_ref().is_some_and(Applied::is_of_no_station);
         let inputs = &self.layout.operator_inputs;
+        let is_pulse = inputs.iter().any(|input| {
+            input.place.bit == write.input && matches!(input.kind, OperatorInputKind::Pulse(_))
+        });
+        let sees_it = !is_pulse || self.actuation.execution != Execution::Stopped;
         let counts = self.counts_by(write.points);
         let taken = match self.inputs.writing.known((inputs, counts), write) {
             Some(known) => known,
             None if !counts => Err(WriteRefusal::OtherPoints),
-            None if runs => {
+            None if runs && sees_it => {
                 let forced = |input| self.inputs.forcing.refuses_write(input, now);
                 self.inputs.writing.take(inputs, write, &forced)
             }

@@ -139,10 +139,15 @@ pub(crate) fn join(holding: Option<Holding>, recalled: Option<Recalled>) -> Body
 
 /// A station that publishes FALSE from the state that it holds.
 pub(crate) fn turn(holding: Holding) -> Body {
+    turn_with(holding, [false])
+}
+
+/// The same with these outputs.
+pub(crate) fn turn_with(holding: Holding, outputs: [bool; 1]) -> Body {
     Body::Turn(Turn {
         heard: StationSet::EMPTY,
         holdings: [holding].into_iter().collect(),
-        words: [Word { mask: ProgramSet::only(PROGRAM), sum: Image::zero(1) }]
+        words: [Word { mask: ProgramSet::only(PROGRAM), sum: Image::from_bits(outputs) }]
             .into_iter()
             .collect(),
         recalled: Vec::new(),

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use understudy_cycle::{Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, Fallback, Layout, OperatorInput, OperatorInputKind, PointPlace, RemoteIo, Settings,
+    Event, Fallback, Layout, Missing, OperatorInput, OperatorInputKind, PointPlace, RemoteIo,
+    Settings, StopPoints,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
@@ -14,7 +15,7 @@ use understudy_wire::{
 };
 
 use crate::bench::{
-    Bench, HISTORY, Said, held_after, join, recalled_of, sample_of, settings, turn,
+    Bench, HISTORY, Said, held_after, join, recalled_of, sample_of, settings, turn, turn_with,
 };
 
 const INITIAL: u64 = 7;
@@ -38,6 +39,8 @@ enum Step {
     Void,
     /// Cycles that the stations follow without a proof of an output, until their samples leave the history.
     Unproved,
+    /// A cycle whose output is proved, and says that a fault has stopped the program.
+    Stopped,
     /// The stations come back with another state, and the operator accepts it.
     Replaced,
     /// The remote I/O starts again, and callers without an answer ask again.
@@ -53,10 +56,13 @@ const WITH_RESTARTS: [Step; 7] = [ForceOff, ForceOn, Unforce, Write, Proved, Unf
 
 const WITHOUT_PROOFS: [Step; 7] = [ForceOff, Unforce, Write, Proved, Unfollowed, Void, Unproved];
 
+const WITH_FAULTS: [Step; 6] = [ForceOff, Unforce, Write, Proved, Unfollowed, Stopped];
+
 /// What the stations hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stations {
     Follow,
+    FollowStopped,
     FollowLate,
     StayBehind,
     Hold(Lineage),
@@ -69,6 +75,14 @@ struct Sampled {
     value: u64,
     forced: bool,
     void: bool,
+    /// Whether a program that runs has executed it.
+    executed: bool,
+}
+
+impl Sampled {
+    fn counts(&self) -> bool {
+        !self.void && self.executed
+    }
 }
 
 /// A remote I/O with one operator input.
@@ -114,6 +128,7 @@ impl Operated {
                     role: Role::Operator,
                     retains: false,
                 }],
+                stop: Some(StopPoints { stopped: 0, reset: 0 }),
                 ..Layout::booleans(0, 1)
             }),
             // Writes are taken while outputs are held.
@@ -169,14 +184,30 @@ impl Operated {
                 if let OperatorInputKind::Pulse(_) = self.kind {
                     // The other state may have seen the button pressed.
                     let moment = self.bench.moment();
-                    self.trace.push(Sampled { moment, value: 1, forced: true, void: false });
+                    self.trace.push(Sampled {
+                        moment,
+                        value: 1,
+                        forced: true,
+                        void: false,
+                        executed: true,
+                    });
                 }
             }
             Event::Sampled { moment, inputs, .. } => {
                 let (value, forced) = (place(self.kind).get(inputs), self.forced);
-                self.trace.push(Sampled { moment: *moment, value, forced, void: false });
+                self.trace.push(Sampled {
+                    moment: *moment,
+                    value,
+                    forced,
+                    void: false,
+                    executed: true,
+                });
             }
             Event::Applied { moment, missing: None, .. } => self.applied = *moment,
+            Event::Applied { moment, missing: Some(Missing::ProgramFault), .. } => {
+                let sampled = self.trace.iter_mut().rev().find(|it| it.moment == *moment);
+                sampled.expect("it is proved").executed = false;
+            }
             _ => {}
         }
     }
@@ -191,7 +222,7 @@ impl Operated {
                 let at = self.trace.iter().rposition(|sampled| sampled.moment == since);
                 let sampled = at.map(|at| self.trace[at]);
                 let has_effect = self.applied >= since
-                    && sampled.is_some_and(|it| it.value == written && !it.forced && !it.void);
+                    && sampled.is_some_and(|it| it.value == written && !it.forced && it.counts());
                 assert!(has_effect, "{:?}: {sampled:?}", self.steps);
             }
             WriteOutcome::Refused { refusal: WriteRefusal::Forced { seconds } } => {
@@ -206,13 +237,15 @@ impl Operated {
         self.sample = None;
         self.receive(0, Body::Sync);
         let sample = self.sample.clone();
-        if let (Stations::Follow | Stations::FollowLate, Some(sample)) = (stations, &sample) {
+        let follow = [Stations::Follow, Stations::FollowStopped, Stations::FollowLate];
+        if let Some(sample) = sample.as_ref().filter(|_| follow.contains(&stations)) {
             self.held = Some(held_after(sample, self.bench.moment()));
             self.recalled = Some(recalled_of(sample, self.bench.moment()));
         }
         for rank in [0, 1] {
             let body = match (stations, sample.is_some(), self.held) {
                 (Stations::Follow, true, Some(held)) => turn(held),
+                (Stations::FollowStopped, true, Some(held)) => turn_with(held, [true]),
                 (Stations::Hold(lineage), _, Some(held)) => {
                     join(Some(Holding { lineage, ..held }), None)
                 }
@@ -290,6 +323,7 @@ impl Operated {
             Unforce => self.unforce(),
             Write => self.write(),
             Proved => self.pass(Stations::Follow),
+            Stopped => self.pass(Stations::FollowStopped),
             Unfollowed => self.pass(Stations::StayBehind),
             Unproved => (0..=HISTORY).for_each(|_| self.pass(Stations::FollowLate)),
             Void => (0..=HISTORY).for_each(|_| self.pass(Stations::StayBehind)),
@@ -325,7 +359,7 @@ impl Operated {
         (0..8).for_each(|_| self.pass(Stations::Follow));
         let steps = &self.steps;
         assert_eq!(self.outcomes.len(), self.writes.len(), "{steps:?}: a write has no answer");
-        let valid: Vec<&Sampled> = self.trace.iter().filter(|sampled| !sampled.void).collect();
+        let valid: Vec<&Sampled> = self.trace.iter().filter(|it| it.counts()).collect();
         let effects = self.outcomes.iter().filter_map(|(session, outcome)| match outcome {
             WriteOutcome::InEffect { since } => Some((*since, self.writes[*session as usize])),
             WriteOutcome::Refused { .. } => None,
@@ -422,6 +456,22 @@ fn a_write_takes_effect_once_where_no_output_is_proved_for_long() {
     ] {
         let mut total = Outcomes::default();
         explore(&Operated::new(kind), &WITHOUT_PROOFS, 5, &mut total);
+        assert!(total.in_effect > 1000 && total.refused > 100, "{kind:?}: {total:?}");
+    }
+}
+
+/// No program that runs has executed a sample whose output says that it is stopped: an online change is taken back to before this scan, and the operator
+/// starts the program anew. So a pulse that lasted no longer had no effect, and what holds is in effect from the first sample that was executed.
+#[test]
+fn a_write_that_only_a_stopped_program_has_seen_is_not_in_effect() {
+    for kind in [
+        OperatorInputKind::Level,
+        OperatorInputKind::Pulse(1),
+        OperatorInputKind::Pulse(3),
+        OperatorInputKind::Setpoint { low: 0, high: 80 },
+    ] {
+        let mut total = Outcomes::default();
+        explore(&Operated::new(kind), &WITH_FAULTS, 6, &mut total);
         assert!(total.in_effect > 1000 && total.refused > 100, "{kind:?}: {total:?}");
     }
 }

@@ -7,7 +7,7 @@ use understudy_cycle::{
     OperatorInputKind, Output, PointPlace, PointsChange, Program, ProgramChange, RemoteIoInput,
 };
 use understudy_logic::CircuitBuilder;
-use understudy_remote_io::{Event, Fallback, RemoteIo, Settings};
+use understudy_remote_io::{Event, Fallback, ForceEnd, RemoteIo, Settings};
 use understudy_typed::Elementary;
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Configurations, Cycle, Force, Frame, Header, Holding,
@@ -297,7 +297,7 @@ fn forces_end_with_the_points_that_they_are_of() {
         let force = Force { signal, value: true.into(), seconds: 60, owner, reason, points };
         plant.bench.tell(RemoteIoInput::Force(&force));
         let seen = plant.cycle(Some(&[false, false]), Some(AFTER));
-        let ended = |event: &Event| matches!(event, Event::Unforced { signal: of, expired: false, .. } if *of == signal);
+        let ended = |event: &Event| matches!(event, Event::Unforced { signal: of, by: ForceEnd::OnlineChange, .. } if *of == signal);
         assert_eq!(seen.events.iter().filter(|event| ended(event)).count(), 1, "{is_input}");
         assert_eq!(seen.inputs, [false, false, true]);
         let driven =

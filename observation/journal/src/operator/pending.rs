@@ -210,6 +210,7 @@ pub fn write_answer(record: &Record) -> Option<WriteAnswer> {
 
 #[cfg(test)]
 mod tests {
+    use understudy_remote_io::ForceEnd;
     use understudy_wire::{Force, Moment, ProgramId, SignalPlace};
 
     use super::*;
@@ -255,7 +256,7 @@ mod tests {
             ),
             (
                 Command::Unforce(Unforce { signal, points: None }),
-                RemoteIoEvent::Unforced { moment, signal, expired: false },
+                RemoteIoEvent::Unforced { moment, signal, by: ForceEnd::Operator },
                 RemoteIoEvent::UnforceRefused { moment, signal, refusal },
             ),
         ];
@@ -319,7 +320,7 @@ mod tests {
             assert_eq!(observe(&mut orders, &Record::of_run(1, end.clone())), 1, "{end:?}");
             assert_eq!(before.try_recv(), Ok(Err(Refusal::Down(NAME.to_owned()))), "{end:?}");
             let mut after = send(&mut orders);
-            let unforced = RemoteIoEvent::Unforced { moment, signal, expired: false };
+            let unforced = RemoteIoEvent::Unforced { moment, signal, by: ForceEnd::Operator };
             assert_eq!(observe(&mut orders, &record(unforced)), 1);
             assert_eq!(after.try_recv(), Ok(Ok(Done::default())));
         }

@@ -9,7 +9,9 @@ use understudy_cluster::Cluster;
 use understudy_journal::{Action, Happening, Members, Process, Record, RunEvent};
 use understudy_node::Event as StationEvent;
 use understudy_plant::{Event as PlantEvent, Pace};
-use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, Missing, ValueFault};
+use understudy_remote_io::{
+    Event as RemoteIoEvent, ForceEnd, Lacking, LackingReason, Missing, ValueFault,
+};
 use understudy_wire::{
     ConfigurationHash, Cycle, Epoch, Field, Force, Image, Lineage, Member, Moment, ProgramId,
     ProgramSet, SignalPlace, Source, StationId, StationSet, Word,
@@ -257,7 +259,7 @@ impl Dice<'_> {
                     points: None,
                 },
             },
-            3 => RemoteIoEvent::Unforced { moment, signal, expired: false },
+            3 => RemoteIoEvent::Unforced { moment, signal, by: ForceEnd::Operator },
             4 => RemoteIoEvent::Protected { moment },
             5 => RemoteIoEvent::Unprotected {
                 moment,

@@ -6,7 +6,8 @@ use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{
-    AskReason, Event as RemoteIoEvent, Lacking, LackingReason, OldInputs, PartnerLack, ValueFault,
+    AskReason, Event as RemoteIoEvent, ForceEnd, Lacking, LackingReason, OldInputs, PartnerLack,
+    ValueFault,
 };
 use understudy_wire::{
     Configurations, Member, Moment, Part, ProgramSet, SignalPlace, StationId, StationSet, Word,
@@ -194,10 +195,8 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         "the signal {} is too old at {}: the default value is sampled",
         members.source(*input), members.place(SignalPlace::Input(*input))
     );
-    Unforced { signal, expired: true, .. } => "unforced" Notice
-        format!("{} is no longer forced: its time has elapsed", members.place(*signal));
-    Unforced { signal, expired: false, .. } => "unforced" Notice
-        format!("{} is no longer forced: removed by the operator", members.place(*signal));
+    Unforced { signal, by, .. } => "unforced" Notice
+        format!("{} is no longer forced: {}", members.place(*signal), force_end_text(*by));
 }
 
 descriptions! { plant: PlantEvent, members: Names<'_>;
@@ -356,6 +355,15 @@ fn configured_text(Configurations { own, prepared }: Configurations) -> String {
             format!("runs configuration {own}, and has loaded {prepared} for an online change")
         }
         None => format!("runs configuration {own}, and has loaded no other one"),
+    }
+}
+
+fn force_end_text(by: ForceEnd) -> &'static str {
+    match by {
+        ForceEnd::Time => "its time has elapsed",
+        ForceEnd::Operator => "removed by the operator",
+        ForceEnd::OnlineChange => "an online change has replaced the inputs and outputs",
+        ForceEnd::Handover => "the other remote I/O of its program takes over",
     }
 }
 

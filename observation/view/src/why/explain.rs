@@ -70,18 +70,19 @@ impl<'m> Explainer<'m> {
         }
         // A pin or the value of a block, or what sees an edge.
         let state = self.model.state_after(self.history, place)?;
-        let block = name.rsplit_once('.').and_then(|(block, _)| {
+        let because = name.rsplit_once('.').and_then(|(block, pin)| {
             let rung = self.rung_of(block)?;
-            self.block_at(block, rung, place, 1)
+            let fed = self.fed(block, pin, rung, place);
+            fed.or_else(|| Some(vec![self.block_at(block, rung, place, 1)?]))
         });
-        let text = if block.is_some() { "after the scan" } else { "no signal of a rung" };
+        let text = if because.is_some() { "after the scan" } else { "no signal of a rung" };
         let declared = part.declared();
         let stored = part.stored(&state).zip(declared.as_ref());
         let value = stored.map(|((_, stored), declared)| shown(declared, stored));
         Ok(Reason {
             value: value.unwrap_or_default(),
             of: declared,
-            because: block.into_iter().collect(),
+            because: because.unwrap_or_default(),
             ..self.leaf(name, false, place, text)
         })
     }

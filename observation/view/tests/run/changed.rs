@@ -282,6 +282,43 @@ fn a_fault_of_the_program_before_is_none_of_the_new_one() {
     assert_eq!(reason.line, Some(5));
 }
 
+/// All processes begin anew within a change: each says where it is in it, also to a view that has not read how the change began.
+#[test]
+fn a_change_is_shown_after_all_members_were_restarted_within_it() {
+    let restarted = [40, 60, 80].into_iter().zip(MEMBERS).flat_map(|(cycle, member)| {
+        [(cycle, Action::Crash), (cycle + 5, Action::Restart)].map(|(at_cycle, action)| Fault {
+            at_cycle,
+            phase: 0.3,
+            member,
+            action,
+        })
+    });
+    let accepted = Fault {
+        at_cycle: 120,
+        phase: 0.3,
+        member: MEMBERS[0],
+        action: Action::Change { step: ChangeStep::Accept },
+    };
+    let faults: Vec<Fault> =
+        faults(30, None).into_iter().chain(restarted).chain([accepted]).collect();
+    let (cluster, mut records) = records("counter.st", [BEFORE, AFTER], &faults);
+    let check = |records: &[Record]| {
+        let model = model(&cluster, records);
+        for (cycle, expected) in [
+            (110, "prepared: counter, understudy, counter-io"),
+            (130, "prepared: understudy, counter-io; accepted: counter"),
+        ] {
+            let change = model.snapshot_at(cycle).expect("known").change;
+            let change = change.unwrap_or_else(|| panic!("{cycle}: it goes on"));
+            assert!(change.text().ends_with(expected), "{cycle}: {}", change.text());
+            assert_eq!(change.before, cluster.agreement().configuration.to_string());
+        }
+    };
+    check(&records);
+    records.retain(|record| !matches!(record.event, Happening::Run(RunEvent::ChangeLoaded { .. })));
+    check(&records);
+}
+
 /// A viewer that has lost records goes on from a state that a station reports, of the program that was accepted meanwhile.
 #[test]
 fn a_state_that_is_told_after_the_acceptance_is_one_of_the_new_program() {

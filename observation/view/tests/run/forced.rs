@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use understudy_journal::{Happening, Record, moment};
-use understudy_remote_io::Event;
+use understudy_remote_io::{Event, ForceEnd};
 use understudy_view::{Bounds, Model};
 use understudy_wire::{Force, Image, Member, ProgramId, SignalPlace};
 
@@ -47,7 +47,7 @@ fn forced_run(value: bool) -> (Model, i64, i64) {
                 let force = force(FAR, value, "anna");
                 model.note(&report(Event::Forced { moment, force }));
             }
-            200 => model.note(&report(Event::Unforced { moment, signal: FAR, expired: true })),
+            200 => model.note(&report(Event::Unforced { moment, signal: FAR, by: ForceEnd::Time })),
             _ => {}
         }
         if (100..200).contains(&deadlines)
@@ -127,7 +127,7 @@ fn the_alarm_of_forces_names_each_of_them() {
         of_forces.map(|alarm| (alarm.over.is_none(), alarm.text)).collect::<Vec<_>>()
     };
     let forced = |signal, owner| Event::Forced { moment, force: force(signal, true, owner) };
-    let unforced = |signal| Event::Unforced { moment, signal, expired: false };
+    let unforced = |signal| Event::Unforced { moment, signal, by: ForceEnd::Operator };
     let names = |alarms: &[(bool, String)], expected: &[&str]| {
         let [(lasts, text)] = alarms else { panic!("{alarms:?}") };
         assert!(lasts, "{text}");

@@ -258,6 +258,8 @@ fn every_line_of_the_journal_has_the_names_of_its_time() {
     // A force ends with the points, in the names of before.
     let unforced = of("unforced");
     assert!(unforced[0].contains("step") && unforced[1].contains("more"), "{unforced:?}");
+    let because = "an online change has replaced the inputs and outputs";
+    assert!(unforced.iter().all(|text| text.ends_with(because)), "{unforced:?}");
     let written = of("written");
     assert!(
         written[0].contains("2 to input step") && written[1].contains("7 to input more"),
@@ -458,6 +460,13 @@ fn a_remote_io_that_starts_again_is_shown_by_its_own_points() {
             let program = &snapshot.programs[0];
             assert_eq!(of_program(&program.values), *values, "{crash}: {cycle}");
         }
+        // It has loaded the change, and says which points it begins with before it is in a cycle.
+        let told: Vec<i64> = model
+            .events()
+            .filter(|event| event.event == "points-changed")
+            .map(|event| event.cycle)
+            .collect();
+        assert!(told.iter().all(|cycle| *cycle >= crash.min(60) as i64), "{crash}: {told:?}");
         assert!(model.alarms().all(|alarm| alarm.alarm != "wrong"));
     }
 }

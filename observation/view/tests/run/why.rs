@@ -162,6 +162,16 @@ ladder = \"plant.ladder\"
 
 /// All reasons of `y` in a cycle, each as `signal = value: text`, where the inputs of `rungs` are set in some cycles.
 fn reasons(rungs: &str, sets: &[(i64, &str, bool)], cycle: i64) -> Vec<String> {
+    reasons_of("own.y", rungs, sets, cycle).expect("it is known")
+}
+
+/// The same of another signal; the error where it has no value.
+fn reasons_of(
+    signal: &str,
+    rungs: &str,
+    sets: &[(i64, &str, bool)],
+    cycle: i64,
+) -> Result<Vec<String>, String> {
     let own = format!("program own\ninput a\ninput b\noutput y\n{rungs}\n");
     let loaded = read_with("cluster.toml", CLUSTER, Overrides::default(), &mut |name| match name {
         "own.ladder" => Ok(own.clone()),
@@ -179,14 +189,14 @@ fn reasons(rungs: &str, sets: &[(i64, &str, bool)], cycle: i64) -> Vec<String> {
         );
     }
     let model = model(&cluster, &scenario(&cluster, &text), 1);
-    let why = model.why("own.y", Some(cycle)).expect("it is known");
+    let why = model.why(signal, Some(cycle)).map_err(|error| error.to_string())?;
     let mut found = Vec::new();
     let mut open = vec![why.because.expect("nothing is fail-safe")];
     while let Some(reason) = open.pop() {
         found.push(format!("{} = {}: {}", reason.signal, reason.value, reason.text));
         open.extend(reason.because);
     }
-    found
+    Ok(found)
 }
 
 /// A block is explained by the input that decided, also where it is on without power, and by what it was where it is read before its call.
@@ -241,4 +251,25 @@ fn each_variable_of_a_ladder_is_explained() {
     }
     // What one program computes is meant, where others read a signal of its name.
     assert!(model.why("full", Some(200)).is_ok());
+}
+
+/// An input of a block is explained by what feeds it, and not by what the block does; a block has no value of its own.
+#[test]
+fn an_input_of_a_block_is_explained_by_what_feeds_it() {
+    let pulse = [(10, "a", true), (20, "a", false), (30, "b", true), (40, "b", false)];
+    let of = |signal: &str, rungs: &str, cycle| reasons_of(signal, rungs, &pulse, cycle);
+    for (signal, rungs, cycle, wanted) in [
+        ("own.s.S", "rung a {RS s R1=b} ( y )", 33, ["a = false"]),
+        ("own.s.R1", "rung a {RS s R1=b} ( y )", 33, ["b = true"]),
+        ("own.t.IN", "rung a {TON t 50ms} ( y )", 12, ["a = true"]),
+        ("own.c.R", "rung a {CTU c 2 R=b}\nrung c.Q ( y )", 15, ["b = false"]),
+    ] {
+        let found = of(signal, rungs, cycle).expect("it is known");
+        let behind: Vec<&str> =
+            found[1..].iter().filter_map(|reason| Some(reason.split_once(": ")?.0)).collect();
+        assert_eq!(behind, wanted, "{signal} at {cycle}: {found:#?}");
+    }
+    let error = of("own.t", "rung a {TON t 50ms} ( y )", 12).expect_err("no value");
+    assert!(error.starts_with("U0573: `own.t` has no value of its own"), "{error}");
+    assert!(error.contains("`t.Q`") && error.contains("`t.ET`"), "{error}");
 }

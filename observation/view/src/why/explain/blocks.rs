@@ -76,6 +76,23 @@ impl Explainer<'_> {
         Some(reason)
     }
 
+    /// Why an input of a block has power in a scan, or has none; nothing for an output, which the block explains.
+    pub(super) fn fed(
+        &mut self,
+        name: &str,
+        pin: &str,
+        rung: usize,
+        place: usize,
+    ) -> Option<Vec<Reason>> {
+        let evaluation = self.evaluation(place)?;
+        let flows = &evaluation.rungs[rung].elements;
+        let network = nodes(&self.program.rungs[rung].network, &mut flows.iter());
+        let found = at_block(&network, name)?;
+        let input = found.block.kind.inputs().position(|input| input == pin)?;
+        let elements = if input == 0 { found.wire.clone() } else { found.feed(pin).1 };
+        Some(self.elements(&elements, rung, place, 1))
+    }
+
     /// Why a block did what it did in an earlier scan: the input that decided.
     fn inputs_at(&mut self, name: &str, rung: usize, place: usize, depth: usize) -> Vec<Reason> {
         let Some(evaluation) = self.evaluation(place) else {
