@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use crate::commands::give;
 use crate::shared::DEADLINE;
 use crate::shared::deployed::{Deployed, text};
 use crate::{Page, answer, empty_folder, member, one_at_a_time, understudy};
@@ -23,16 +24,6 @@ fn synchronised(page: &Page) {
         let publishing = |name| member(state, name)["state"] == "publishing";
         ["robot", "press", "understudy"].into_iter().all(publishing)
     });
-}
-
-fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
-    let body = json!({ "member": name, "command": command, "owner": "anna", "reason": "a test" });
-    let answer = page.post("/api/command", &body.to_string());
-    let code = match answer.status {
-        200 => String::new(),
-        _ => answer.code(),
-    };
-    (answer.status, code)
 }
 
 fn journal(runs: &Path) -> Vec<Value> {

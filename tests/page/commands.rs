@@ -39,8 +39,16 @@ fn started_of(name: &str, watched: &[&str], stations: &[&str]) -> (Page, std::pa
     (page, runs)
 }
 
+/// A signal is named as the page does it: by its place in the inputs and outputs that count.
 pub(crate) fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
-    let body = json!({ "member": name, "command": command, "owner": "anna", "reason": "a test" });
+    let mut body =
+        json!({ "member": name, "command": command, "owner": "anna", "reason": "a test" });
+    if command["signal"].is_object() {
+        let programs = page.get("/api/run").json()["programs"].clone();
+        let mut programs = programs.as_array().expect("programs").iter();
+        let own = programs.find(|program| program["remote_io"] == name).expect("its program");
+        body["points"] = own["points"].clone();
+    }
     let answer = page.post("/api/command", &body.to_string());
     let code = if answer.status == 200 { String::new() } else { answer.code() };
     (answer.status, code)
@@ -180,6 +188,14 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     page.wait_for("a free output", |state| {
         state["programs"][0]["forced"].as_array().is_some_and(Vec::is_empty)
     });
+
+    // A place without its inputs and outputs may be that of another signal, also when the change is over.
+    for command in [force(json!({ "output": 0 }), 5), unforce] {
+        let body = json!({ "member": "robot-io", "command": command, "owner": "anna", "reason": "a test" });
+        let answer = page.post("/api/command", &body.to_string());
+        assert_eq!((answer.status, answer.code().as_str()), (400, "U0682"), "{}", answer.body);
+        assert!(answer.body.contains("`points`"), "{}", answer.body);
+    }
 
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     assert_eq!(page.end(), 0);

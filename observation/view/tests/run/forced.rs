@@ -155,3 +155,20 @@ fn an_image_of_another_width_is_no_deadline() {
     let snapshot = model.snapshot();
     assert_eq!((&snapshot.programs[0].outputs, snapshot.programs[0].source), (&None, None));
 }
+
+/// Journals before had `expired` in place of what has ended a force.
+#[test]
+fn the_end_of_a_force_is_read_from_older_journals() {
+    let read = |end: &str| {
+        let line = format!(
+            r#"{{"event":"unforced","moment":{{"epoch":1,"cycle":5}},"signal":{{"input":0}},{end}}}"#
+        );
+        match serde_json::from_str(&line) {
+            Ok(Event::Unforced { by, .. }) => by,
+            other => panic!("{line}: {other:?}"),
+        }
+    };
+    assert_eq!(read(r#""expired":true"#), ForceEnd::Time);
+    assert_eq!(read(r#""expired":false"#), ForceEnd::Operator);
+    assert_eq!(read(r#""by":"online-change""#), ForceEnd::OnlineChange);
+}

@@ -31,7 +31,7 @@ pub(super) struct Asked {
     command: AskedCommand,
     owner: String,
     reason: String,
-    /// Hash of the version of the program whose points the caller knows, for a command that names a signal.
+    /// Hash of the version of the program whose points the caller knows; needed where the command names a signal by its place.
     #[serde(default)]
     points: Option<String>,
 }
@@ -159,6 +159,10 @@ fn ordered(app: &App, person: &Person, asked: Asked) -> Answered<Ordered> {
     let started = || Problem::unknown("the run has not started");
     let points = model.known().ok_or_else(started)?.run.present().points();
     let cluster = points.cluster();
+    if asked.points.is_none() && asked.command.names_a_place() {
+        let message = "a force and its end name a signal by its place: they need `points`, which `/api/run` has for each program";
+        return Err(Problem::bad(message));
+    }
     fits(asked.points.as_deref(), points, member)?;
     let by = By { role: person.role, owner: &owner, reason: &reason };
     let command = asked.command.given(cluster, member, by)?;
@@ -214,6 +218,11 @@ impl AskedCommand {
             Self::Unforce { signal } => ("unforce", place(signal)),
             Self::Write { input, .. } => ("write", input.clone()),
         }
+    }
+
+    /// Whether its signal is named by a place, which is of another signal after an online change of the points.
+    fn names_a_place(&self) -> bool {
+        matches!(self, Self::Force { .. } | Self::Unforce { .. })
     }
 
     /// The command to a member of the cluster.
