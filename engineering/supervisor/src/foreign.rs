@@ -1,7 +1,7 @@
 //! Automata of other tools, which know states and events by names: Supremica's modules (.wmod) and libFAUDES' generators (.gen).
 //!
 //! Names keep their letters except those that no word of a model file has (white space, quotes), which become `_`; labels
-//! are those of [`labels`](crate::labels). What a file says and an automaton cannot is an error, never left out.
+//! are those of `labels`. What a file says and an automaton cannot is an error, never left out.
 
 mod draft;
 mod generator;
