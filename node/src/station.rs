@@ -32,6 +32,8 @@ use understudy_wire::{
     Time,
 };
 
+use relay::Relay;
+
 use crate::event::Event;
 use crate::replica::{Followed, Replica, Standing};
 use crate::settings::Settings;
@@ -56,10 +58,7 @@ pub struct Station {
     joining: StationSet,
     /// Programs and stations whose states differed in the last cycle.
     differed: SmallVec<[(ProgramId, StationId); 1]>,
-    /// Programs whose samples another station lacked in the last cycle.
-    lacked: ProgramSet,
-    /// Programs of `lacked` whose samples this station had.
-    awaited: ProgramSet,
+    relay: Relay,
     /// Cycles in a row without a sample, for each replica; reported at a bound, and without effect on the cycle.
     unsampled: SmallVec<[u32; 2]>,
     /// When the last cycle began that was looked at for samples.
@@ -118,14 +117,6 @@ struct CycleNotes {
     joiners: StationSet,
     /// Another station was received.
     receives_station: bool,
-    /// The samples of this cycle, from their remote I/Os or relayed.
-    samples: SmallVec<[Arc<Frame>; 2]>,
-    /// Programs whose samples came from their remote I/Os.
-    direct: ProgramSet,
-    /// Programs whose samples other stations lack.
-    lacked: ProgramSet,
-    /// Programs whose samples a station has relayed.
-    relayed: ProgramSet,
 }
 
 /// The members that a station received.
@@ -182,8 +173,7 @@ impl Station {
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
             differed: SmallVec::new(),
-            lacked: ProgramSet::EMPTY,
-            awaited: ProgramSet::EMPTY,
+            relay: Relay::default(),
             unsampled: settings.runs().map(|_| 0).collect(),
             looked_at: now,
             lacks_program: SmallVec::new(),
@@ -284,7 +274,7 @@ impl Station {
         }
         match (&frame.body, frame.header.sender) {
             (Body::Sample(sample), Member::RemoteIo(program) | Member::Twin(program)) => {
-                self.cycle.direct.insert(program);
+                self.relay.receive(program);
                 self.follow(program, frame, sample);
             }
             (Body::Turn(turn), Member::Station(station)) => {
@@ -299,7 +289,7 @@ impl Station {
     }
 
     fn follow(&mut self, program: ProgramId, frame: &Arc<Frame>, sample: &Sample) {
-        self.keep_sample(frame);
+        self.relay.keep(frame);
         let excluded = sample.excluded.contains(self.own());
         let moment = frame.header.moment;
         let Some(replica) = replica_mut(&mut self.replicas, program) else {
@@ -461,8 +451,7 @@ impl Hash for Station {
             wanted,
             joining,
             differed,
-            lacked,
-            awaited,
+            relay,
             // Only reported.
             unsampled: _,
             looked_at: _,
@@ -470,6 +459,6 @@ impl Hash for Station {
         } = self;
         (member, replicas).hash(hasher);
         (cycle, closed, company, started, role, wanted).hash(hasher);
-        (joining, differed, lacked, awaited).hash(hasher);
+        (joining, differed, relay).hash(hasher);
     }
 }

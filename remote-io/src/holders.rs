@@ -47,7 +47,7 @@ impl Holders {
         let schedule = &agreement.schedule;
         let (controllers, stations) = (schedule.controllers(), schedule.stations());
         let living_for = agreement.flag_after;
-        let own = StationId(program.0);
+        let own = program.controller();
         let understudies = (controllers as u8..stations as u8).map(StationId);
         let entries = [own]
             .into_iter()

@@ -73,7 +73,7 @@ impl<'a> Received<'a> {
             }
         };
         let vote = votes.swap_remove(place);
-        let selection = if vote.station == StationId(me.0) {
+        let selection = if vote.station == me.controller() {
             Selection::Direct(vote.outputs)
         } else {
             Selection::Reconstructed(vote.outputs, vote.station)
@@ -94,10 +94,10 @@ impl<'a> Received<'a> {
         if let Some((word, holding)) = self.own_word(me)
             && holding.lineage == truth
             && word.sum.width() == width
-            && !excluded.contains(StationId(me.0))
+            && !excluded.contains(me.controller())
         {
             votes.push(Vote {
-                station: StationId(me.0),
+                station: me.controller(),
                 digest: holding.digest,
                 outputs: word.sum.clone(),
                 independent: true,
@@ -150,7 +150,7 @@ impl<'a> Received<'a> {
         words.flatten().filter_map(move |(understudy, turn, word)| {
             let addend = |program| self.addend(program, turn);
             let syndrome = understudy_parity::syndrome(word, addend)?;
-            let accused = word.mask.iter().map(|program| StationId(program.0));
+            let accused = word.mask.iter().map(|program| program.controller());
             let accused = accused.chain([understudy]).collect();
             (!syndrome.is_zero()).then_some((syndrome, accused))
         })
@@ -202,7 +202,7 @@ impl<'a> Received<'a> {
 
     /// The output that a controller publishes of its own program, with the state that it is computed from.
     fn own_word(&self, program: ProgramId) -> Option<(&'a Word, &'a Holding)> {
-        let turn = self.turn_of(StationId(program.0))?;
+        let turn = self.turn_of(program.controller())?;
         let own = ProgramSet::only(program);
         let word = turn.words.iter().find(|word| word.mask == own)?;
         Some((word, Holding::of(&turn.holdings, program)?))

@@ -6,7 +6,7 @@ use understudy_text::duration;
 
 use understudy_journal::{Members, source_word};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Member, StationId, Via};
+use understudy_wire::{Member, Via};
 
 use crate::scenario::{Expectation, Scenario, action_word, set, set_value, written};
 
@@ -102,7 +102,7 @@ fn write_step(text: &mut String, step: &Fault, members: &Members) {
         Action::Corrupt { frames } => writeln!(text, "frames = {frames}"),
         Action::Replay { age } => writeln!(text, "age = {age}"),
         Action::FlipState { program, bit } => {
-            let controller = name(Member::Station(StationId(program.0)));
+            let controller = name(Member::Station(program.controller()));
             writeln!(text, "program = {controller}\nbit = {bit}")
         }
         Action::FlipSample { bit, frames } | Action::FlipWord { bit, frames } => {

@@ -30,7 +30,7 @@ impl Station {
         let follows = self.closed.is_some_and(|closed| moment <= closed.plus(1));
         self.closed = Some(moment);
         let [last, earlier] = self.company;
-        let remote_ios = self.cycle.direct;
+        let remote_ios = self.relay.direct();
         let now = Company { remote_ios, stations: self.cycle.receives_station };
         if !follows || now.is_none() {
             for replica in &mut self.replicas {
@@ -48,7 +48,7 @@ impl Station {
         }
         self.note_samples(moment);
         self.joining = self.cycle.joiners;
-        self.close_relay();
+        self.relay.close_cycle();
         self.differed = std::mem::take(&mut self.cycle.differs);
         self.cycle = CycleNotes::default();
     }
@@ -64,7 +64,7 @@ impl Station {
         let bound = missing_after(agreement.schedule.period()).max(agreement.listen_cycles * 6);
         for (place, replica) in self.replicas.iter().enumerate() {
             let program = replica.id();
-            let is_sampled = self.has_sample(program);
+            let is_sampled = self.relay.has_sample(program);
             let unsampled = &mut self.unsampled[place];
             if is_sampled {
                 if *unsampled >= bound {
@@ -108,7 +108,8 @@ impl Station {
     /// master begins the cycle with this Sync; the turns of those that wait for its sample would come too late.
     pub(super) fn repeats_sync_at(&self) -> Option<Time> {
         let lower = self.living().and(StationSet::first(self.own().index()));
-        let lacks_sample = || self.replicas.iter().any(|replica| !self.has_sample(replica.id()));
+        let lacks_sample =
+            || self.replicas.iter().any(|replica| !self.relay.has_sample(replica.id()));
         let repeats = self.role == Role::Following
             && !self.cycle.has_repeated_sync
             && self.publishes()

@@ -17,7 +17,7 @@ impl Station {
         self.cycle.joiners.insert(station);
         self.take_recalled(&join.recalled);
         self.receive_holdings(station, &join.holdings, &join.recalled);
-        self.cycle.lacked = self.cycle.lacked.or(join.lacks);
+        self.relay.lack(join.lacks);
         let mut budget = SEGMENTS_A_CYCLE.saturating_sub(self.cycle.segments);
         for program in join.wants.iter() {
             let others_give = self.cycle.others_have.contains(program) && self.own().0 != program.0;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use smallvec::SmallVec;
 use understudy_cycle::Turns;
 use understudy_wire::{
-    Holding, Moment, ProgramId, ProgramSet, Segment, StationId, StationSet, Time, Turn, Word,
+    Holding, Moment, ProgramSet, Segment, StationId, StationSet, Time, Turn, Word,
 };
 
 use super::{ControllerTurn, Station, Token, place_of, replica_mut};
@@ -25,7 +25,7 @@ impl Station {
         if !self.is_understudy() {
             self.member.attendance.attest(turn.heard);
         }
-        let own_program = ProgramId(station.0);
+        let own_program = station.controlled();
         let understudy = self.settings.agreement.schedule.is_understudy(station);
         for word in &turn.words {
             if !understudy
@@ -98,7 +98,7 @@ impl Station {
         };
         let due = self.publishes_by(moment);
         let early =
-            self.has_token() && self.knows_all_outputs(moment) && self.has_what_others_lack();
+            self.has_token() && self.knows_all_outputs(moment) && self.relay.has_what_others_lack();
         if now >= due || early {
             self.publish(now, moment);
         }

@@ -182,7 +182,7 @@ pub(crate) fn source_text(
 
 /// A program has the name of its controller.
 pub(crate) fn program_name(program: ProgramId, members: &Members) -> &str {
-    members.name(Member::Station(StationId(program.0)))
+    members.name(Member::Station(program.controller()))
 }
 
 fn programs(set: ProgramSet, members: &Members) -> String {

@@ -153,7 +153,7 @@ impl Model {
     }
 
     fn killed_at(&self, program: ProgramId) -> Option<i64> {
-        let states = self.series().station(StationId(program.0))?;
+        let states = self.series().station(program.controller())?;
         let mut spans = states.spans(0, i64::MAX);
         let killed = spans.find(|span| *span.value == StationState::Killed)?;
         Some(killed.from)
@@ -199,7 +199,7 @@ impl Model {
 
     fn filmed_stations(&self, program: ProgramId) -> Vec<StationId> {
         let schedule = &self.cluster().agreement().schedule;
-        let own = StationId(program.0);
+        let own = program.controller();
         let all = (0..schedule.stations() as u8).map(StationId);
         let (understudies, controllers): (Vec<_>, Vec<_>) =
             all.partition(|station| schedule.is_understudy(*station));
@@ -256,7 +256,7 @@ impl Model {
         joined(within.filter_map(|step| {
             let driven = step.driven.as_ref()?;
             let sender = match driven.source {
-                Source::Direct => Some(StationId(program.0)),
+                Source::Direct => Some(program.controller()),
                 Source::Reconstructed => driven.word_of,
                 Source::Held | Source::FailSafe => None,
             };

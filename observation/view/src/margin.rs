@@ -161,7 +161,7 @@ impl Holders {
         let published: ProgramSet = all
             .iter()
             .filter(|program| {
-                publishes(StationId(program.0)).is_some_and(|holds| holds.contains(*program))
+                publishes(program.controller()).is_some_and(|holds| holds.contains(*program))
             })
             .collect();
         let ranks = (0..self.holds.len()).map(|rank| StationId(rank as u8));
@@ -169,7 +169,7 @@ impl Holders {
             .map(|station| {
                 let holds = publishes(station)?;
                 let words = if station.index() < controllers {
-                    let own = ProgramId(station.0);
+                    let own = station.controlled();
                     words_of_controller(own, outputs.get(own.index())?)
                 } else {
                     words_of_understudy(self.mode, all, holds, published, |program| {

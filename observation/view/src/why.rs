@@ -434,7 +434,7 @@ impl Model {
         let turn = turns.iter().find(|turn| turn.station == station)?;
         let word = turn.words.iter().find(|word| word.mask.contains(program))?;
         let published = |other: ProgramId| {
-            let turn = turns.iter().find(|turn| turn.station == StationId(other.0))?;
+            let turn = turns.iter().find(|turn| turn.station == other.controller())?;
             turn.words.first().map(|word| &word.sum)
         };
         let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;

@@ -16,7 +16,7 @@ use understudy_view::{
     Alarm, ChangeSnapshot, LostState, Model as RunModel, ProcessAlarm, ProgramSnapshot, Protection,
     RemoteIoSnapshot, Snapshot, forced_point, forced_value, value_of,
 };
-use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
+use understudy_wire::{Force, Member, ProgramId, SignalPlace};
 
 use self::members::{ShownMember, members};
 use self::redundancy::{Redundancy, redundancy};
@@ -274,7 +274,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
 
 /// A program has the name of its controller.
 pub(crate) fn program_name(run: &RunModel, program: ProgramId) -> String {
-    let controller = Member::Station(StationId(program.0));
+    let controller = Member::Station(program.controller());
     run.members().name(controller).to_owned()
 }
 

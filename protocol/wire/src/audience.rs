@@ -192,7 +192,7 @@ impl Roster {
             }
             (Topic::Sample, Member::RemoteIo(program)) => Audience {
                 stations: understudies
-                    .or(StationSet::only(StationId(program.0)))
+                    .or(StationSet::only(program.controller()))
                     .or(self.following(program.index(), 1)),
                 remote_ios: self.neighbours_of(role),
                 ..Audience::default()

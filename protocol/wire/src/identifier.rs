@@ -21,6 +21,11 @@ impl ProgramId {
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
+
+    /// The station that is its controller: the one of its rank.
+    pub fn controller(self) -> StationId {
+        StationId(self.0)
+    }
 }
 
 /// A station's 0-based rank: controllers 0..N in the order of their programs, then the understudies N..N+S.
@@ -32,6 +37,11 @@ impl StationId {
     /// The rank, as a `usize`.
     pub fn index(self) -> usize {
         usize::from(self.0)
+    }
+
+    /// The program that it controls, where it is a controller.
+    pub fn controlled(self) -> ProgramId {
+        ProgramId(self.0)
     }
 }
 

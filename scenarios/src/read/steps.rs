@@ -409,7 +409,7 @@ impl Reader<'_> {
         let programs = self.members?.remote_ios().count();
         let controller = |member: Option<Member>| match member {
             Some(Member::Station(station)) if station.index() < programs => {
-                Some(ProgramId(station.0))
+                Some(station.controlled())
             }
             _ => None,
         };

@@ -187,7 +187,7 @@ fn sample() -> Body {
 /// A controller holds its own program, the understudy all.
 fn turn(own: StationId) -> Body {
     let mask: ProgramSet = if own.0 < PROGRAMS {
-        ProgramSet::only(ProgramId(own.0))
+        ProgramSet::only(own.controlled())
     } else {
         ProgramSet::first(usize::from(PROGRAMS))
     };

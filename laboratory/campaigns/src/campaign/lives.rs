@@ -198,7 +198,7 @@ impl<'a> Lives<'a> {
     fn duty(&self, station: StationId) -> ProgramSet {
         let programs = self.cluster.controllers().len();
         if station.index() < programs {
-            ProgramSet::only(ProgramId(station.0))
+            ProgramSet::only(station.controlled())
         } else {
             ProgramSet::first(programs)
         }

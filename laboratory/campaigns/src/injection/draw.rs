@@ -226,7 +226,7 @@ impl Draw<'_> {
                 let program = member.sampled_program()?;
                 let station = match Role::Understudy.members(schedule).next() {
                     Some(understudy) if self.random.random_range(0..2) == 0 => understudy,
-                    _ => Member::Station(StationId(program.0)),
+                    _ => Member::Station(program.controller()),
                 };
                 // Restarted one after the other, in either order.
                 let apart = self.random.random_range(0..=4);
@@ -324,7 +324,7 @@ impl Draw<'_> {
             Kind::Forgery => vec![step(from, Action::Forge)],
             Kind::FlippedState => {
                 let program = match (role, member) {
-                    (Role::Controller, Member::Station(station)) => ProgramId(station.0),
+                    (Role::Controller, Member::Station(station)) => station.controlled(),
                     _ => ProgramId(self.random.random_range(0..schedule.controllers()) as u8),
                 };
                 let bit = self.random.random_range(0..64);

@@ -260,6 +260,6 @@ impl Simulation {
     fn candidates(&self, program: ProgramId) -> impl Iterator<Item = StationId> + use<> {
         let understudies = self.remote_ios.len()..self.stations.len();
         let understudies = understudies.map(|rank| StationId(rank as u8));
-        [StationId(program.0)].into_iter().chain(understudies)
+        [program.controller()].into_iter().chain(understudies)
     }
 }

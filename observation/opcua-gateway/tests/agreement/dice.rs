@@ -308,7 +308,7 @@ impl Dice<'_> {
         }
         let member = Some(Member::Station(station));
         if publishes {
-            let own = ProgramSet::only(ProgramId(station.0));
+            let own = ProgramSet::only(station.controlled());
             let schedule = &self.cluster.agreement().schedule;
             let mask = if schedule.is_understudy(station) {
                 ProgramSet::first(schedule.controllers())

@@ -401,7 +401,7 @@ impl Model {
         missing: Option<Missing>,
         heard: StationSet,
     ) -> Option<String> {
-        let own = StationId(program.0);
+        let own = program.controller();
         if source == Source::Direct || heard.contains(own) {
             return None;
         }

@@ -77,7 +77,7 @@ fn nothing_is_lost(cluster: &Cluster, records: &[Record], context: &str) {
         let subjects: BTreeSet<(&str, &str)> =
             lasting.iter().map(|alarm| (alarm.name.as_str(), alarm.alarm)).collect();
         assert_eq!(subjects.len(), lasting.len(), "two alarms of one cause: {context}");
-        let name = |program: ProgramId| members.name(Member::Station(StationId(program.0)));
+        let name = |program: ProgramId| members.name(Member::Station(program.controller()));
         let named: BTreeSet<(&str, &str)> = lasting
             .iter()
             .flat_map(|alarm| alarm.programs.iter().map(|name| (alarm.alarm, name.as_str())))

@@ -199,7 +199,7 @@ impl Attention {
         let understudies = understudies.iter().filter(|it| present(*it)).count() as u32;
         let programs = (0..self.controllers).map(|place| ProgramId(place as u8));
         let provers =
-            programs.map(|program| understudies + u32::from(present(StationId(program.0))));
+            programs.map(|program| understudies + u32::from(present(program.controller())));
         provers.filter(|provers| *provers > 0).min().map(|provers| provers - 1)
     }
 }
