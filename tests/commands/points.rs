@@ -241,3 +241,48 @@ fn of_a_run(folder: &Path, program: &str) {
     }
     places::at_every_place(folder, program);
 }
+
+/// Programs whose values are finite, in each language: a BOOL takes a digital terminal, also in an array or a structure, and every number an analog one.
+#[test]
+fn a_point_takes_a_terminal_of_its_type() {
+    const TYPES: &str = "TYPE Mode : (Off := 0, Manual := 3, Auto := 7); Motor : STRUCT mode : Mode; on : BOOL; END_STRUCT; END_TYPE\n";
+    const POINTS: &str =
+        "n : INT (-5..9); m : Mode; bits : ARRAY[0..2] OF BOOL; mot : Motor; b : BOOL; END_VAR\n";
+    let folder = empty_folder("terminals");
+    let names = ["n", "m", "bits", "mot", "b"];
+    let outputs = names.iter().fold(POINTS.to_owned(), |points, name| {
+        points.replacen(&format!("{name} : "), &format!("q{name} : "), 1)
+    });
+    let lines = |line: &dyn Fn(&str) -> String| names.map(line).concat();
+    let head = format!("{TYPES}PROGRAM one\nVAR_INPUT {POINTS}VAR_OUTPUT {outputs}");
+    for (file, body) in [
+        ("text.st", lines(&|name| format!("q{name} := {name};\n"))),
+        ("list.st", lines(&|name| format!("LD {name}\nST q{name}\n"))),
+    ] {
+        fs::write(folder.join(file), format!("{head}{body}END_PROGRAM\n")).expect("written");
+    }
+    run(&folder, &["convert", "text.st", "text.xml", "--to", "plcopen"]);
+    run(&folder, &["convert", "text.st", "blocks.xml", "--to", "plcopen-fbd"]);
+    for program in ["text.st", "list.st", "text.xml", "blocks.xml"] {
+        let counted = understudy_in(&folder, &["resources", program, "--json"]).json();
+        let counted = &counted["result"]["programs"][0];
+        for (key, expected) in
+            [("inputs", 5), ("outputs", 5), ("analog_inputs", 3), ("analog_outputs", 3)]
+        {
+            assert_eq!(counted[key], expected, "{program} {key}: {counted}");
+        }
+        let allocated = understudy_in(&folder, &["allocate", program, "--json"]).json();
+        let items = allocated["result"]["items"].as_array().expect("an item");
+        let candidates = items[0]["candidates"].as_array().expect("candidates");
+        let mut findings = candidates
+            .iter()
+            .flat_map(|candidate| candidate["findings"].as_array().cloned().unwrap_or_default());
+        for (criterion, need) in
+            [("digital_inputs", 5), ("digital_outputs", 5), ("analog_in", 3), ("analog_out", 3)]
+        {
+            let is_it = |finding: &Value| finding["criterion"] == criterion;
+            let finding = findings.find(is_it).expect("each terminal is looked at");
+            assert_eq!(finding["need"], need, "{program} {criterion}");
+        }
+    }
+}
